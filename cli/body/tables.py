@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cli.body.moving import AXES, Array, CorrectionMass, MovingBody
+from cli.body.moving import AXES, CorrectionMass, MovingBody
 from cli.read.parts import SEVERAL
 from cli.show.picture import blank
 from dalembert.angles import degrees
@@ -83,22 +83,25 @@ def _entry(
 def _of_body(b: MovingBody) -> Iterator[Entry]:
     yield _entry(b, "mass", "mass", lambda b: b.body.mass)
     yield _entry(b, "center", "length", lambda b: b.body.center)
-    tensors = {"inertia": lambda b: b.body.inertia}
+    tensors: dict[str, Part] = {"inertia": lambda b, i: b.body.inertia[i]}
     if b.request.about is not None:
-        tensors["inertia_about"] = lambda b: b.body.about(b.point)
-    for name, tensor in tensors.items():
+        tensors["inertia_about"] = lambda b, i: b.body.about(b.point)[i]
+    for name, row in tensors.items():
         for i, letter in enumerate("xyz"):
-            yield _entry(b, f"{name}_{letter}", "inertia", _row(i, tensor), f"{name}.{i}", name)
+            yield _entry(b, f"{name}_{letter}", "inertia", _numbered(row, i), f"{name}.{i}", name)
     yield Entry("principal", "inertia", lambda: b.body.principal.moments, lambda: b.principal_errors[0])
     for i in range(3):
-        axis = partial(_row(i, lambda b: b.body.principal.axes), b)
-        error = partial(_row(i, lambda b: b.principal_errors[1]), b)
+        axis = partial(_numbered(lambda b, k: b.body.principal.axes[k], i), b)
+        error = partial(_numbered(lambda b, k: b.principal_errors[1][k], i), b)
         yield Entry(f"principal_axis_{i + 1}", "number", axis, error, f"principal_axes.{i}", "principal_axes")
 
 
-def _row(i: int, of: Callable[[MovingBody], Array]) -> Callable[[MovingBody], Array]:
-    """A row of a matrix of a body."""
-    return lambda b: of(b)[i]  # type: ignore[no-any-return]
+Part: TypeAlias = Callable[[MovingBody, int], Any]
+"""A row of a matrix of a body, or what one of its bearings bears, by its number."""
+
+
+def _numbered(part: Part, i: int) -> Callable[[MovingBody], Any]:
+    return lambda b: part(b, i)
 
 
 def _of_motion(b: MovingBody) -> Iterator[Entry]:
@@ -115,7 +118,7 @@ def _of_motion(b: MovingBody) -> Iterator[Entry]:
 
 def _of_shaft(b: MovingBody) -> Iterator[Entry]:
     """Forces of the bearings across the axis; the first takes the axial force."""
-    forces: dict[str, Callable[[MovingBody, int], Array]] = {
+    forces: dict[str, Part] = {
         "static": lambda b, i: b.static_force(i),
         "dynamic": lambda b, i: b.drawn(b.shaft.dynamic[i]),
     }
@@ -123,7 +126,7 @@ def _of_shaft(b: MovingBody) -> Iterator[Entry]:
         forces["corrected"] = lambda b, i: b.drawn(b.corrected[i])
     for i in range(2):
         for kind, of in forces.items():
-            yield _entry(b, f"bearing{i + 1}_{kind}", "force", partial(of, i=i), None, f"bearing{i + 1}")
+            yield _entry(b, f"bearing{i + 1}_{kind}", "force", _numbered(of, i), None, f"bearing{i + 1}")
     yield _entry(b, "drive_torque", "torque", lambda b: b.shaft.drive_torque, None)
 
 

@@ -327,11 +327,11 @@ def way(e: Engine) -> list[Topic]:
     )
     result = [Topic("orders", text, "Orders of each piston")]
     shares: list[list[float]] = []
-    every_force = e.reciprocating
+    f = e.reciprocating
     for i in range(len(names_of)):
-        z, ahead, back = (part[[i]] for part in (every_force.z, every_force.with_crank, every_force.against))
-        shares += Forces(z, ahead, back).coefficients()[used].reshape(-1, 4).tolist()
-    shares += every_force.coefficients()[used].reshape(-1, 4).tolist()
+        one = Forces(f.z[[i]], f.with_crank[[i]], f.against[[i]])
+        shares += one.coefficients()[used].reshape(-1, 4).tolist()
+    shares += f.coefficients()[used].reshape(-1, 4).tolist()
     every = [name for name in (*names_of, "sum") for _ in used]
     orders_of = [k + 1 for k in used]
     keys = [names("cylinder", every), _order(orders_of * (len(names_of) + 1))]
