@@ -13,6 +13,7 @@ from io import TextIOWrapper
 import typer
 from typer.core import TyperGroup
 
+from cli import COMPLETE, completed_words
 from dalembert.arithmetic.choice import EngineError, wanted
 from dalembert.errors import DataError, one_line
 
@@ -62,7 +63,7 @@ GROUPS = {
         "grade": ("cli.grade", "Mark the answers to an exercise, and name likely mistakes."),
     },
     "Files": {
-        "import": ("cli.formats.import_command", "Import a mechanism drawn in another program."),
+        "import": ("cli.formats", "Import a mechanism drawn in another program."),
         "export": (
             "cli.formats.export_command",
             "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
@@ -74,8 +75,6 @@ GROUPS = {
         "completion": ("cli.completion", "Print the completion script for bash, zsh or fish."),
     },
 }
-COMPLETE = "_DALEMBERT_COMPLETE"
-"""The environment variable by which a shell asks for completions."""
 COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
 
 
@@ -161,7 +160,7 @@ def _words() -> list[str]:
     from typer.completion import completion_init  # type: ignore[attr-defined]
 
     completion_init()
-    return (os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or "").split()[1:]
+    return completed_words()[1:]
 
 
 def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:

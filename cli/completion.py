@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from enum import StrEnum
 from functools import partial
@@ -13,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
+from cli import COMPLETE, completed_words
+
 if TYPE_CHECKING:
     from virtualwork import Mechanism
 
 
-VARIABLE = "_DALEMBERT_COMPLETE"
-"""The shell asks through this environment variable."""
 NAMES = """
 # NAME=VALUE is one word, and no blank follows NAME=
 COMP_WORDBREAKS=${COMP_WORDBREAKS//=/}
@@ -35,7 +34,7 @@ class Shell(StrEnum):
 
 def run(shell: Annotated[Shell, typer.Argument(help="The shell that reads the script.")]) -> None:
     """Print the completion script of a shell: source <(dalembert completion bash), in fish dalembert completion fish | source."""
-    script = get_completion_script(prog_name="dalembert", complete_var=VARIABLE, shell=shell.value)
+    script = get_completion_script(prog_name="dalembert", complete_var=COMPLETE, shell=shell.value)
     if shell is Shell.bash:
         ends = "    [[ ${COMPREPLY[0]} == *= ]] && compopt -o nospace 2>/dev/null\n    return 0\n"
         script = script.replace("    return 0\n", ends) + NAMES
@@ -92,8 +91,7 @@ def _after_comma(words: Words, ctx: typer.Context, incomplete: str) -> list[str]
 
 def _files() -> list[str]:
     """The files that the command line names so far: the parser knows none before the option is complete."""
-    words = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
-    return [word for word in words.split() if Path(word).is_file()]
+    return [word for word in completed_words() if Path(word).is_file()]
 
 
 def _mechanism() -> Mechanism:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from cli.read.options import bad
 from cli.show.output import command
+from dalembert.angles import degrees
 from dalembert.errors import DataError
+from dalembert.units import AMPLITUDES, UNITS, amplitude_kind, find_unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from balancing.synchronous import OncePerTurn
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
+    from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
     from dalembert.results.way import Topic
     from dalembert.tables.table import Table as ReadTable
@@ -169,8 +172,6 @@ def _without_volts(header: list[str]) -> list[str]:
     >>> _without_volts(["t_s", "keyphasor_V", "A_mV"])
     ['t_s', 'keyphasor', 'A_mV']
     """
-    from dalembert.units import AMPLITUDES, find_unit
-
     parts = [(name, *name.rpartition("_")[::2]) for name in header]
     return [
         mark if mark.lower() in MARKS and find_unit("amplitude", unit) in AMPLITUDES["voltage"] else name
@@ -180,8 +181,6 @@ def _without_volts(header: list[str]) -> list[str]:
 
 def _vibration(file: str, header: list[str], others: tuple[str, ...]) -> dict[str, str]:
     """The columns of vibration: name -> unit, one unit for all."""
-    from dalembert.units import amplitude_kind, find_unit
-
     units: dict[str, str] = {}
     for name in header:
         parts = name.split("_")
@@ -215,7 +214,6 @@ def _exact(
     import numpy as np
 
     from cli.read.exact import long_column
-    from dalembert.units import UNITS
 
     t, mark, tacho = (None if name is None else table.numbers[name] for name in names)
     assert t is not None
@@ -229,31 +227,23 @@ def vectors(recording: Recording) -> Table:
     """A row for each sensor."""
     import numpy as np
 
-    from dalembert.angles import degrees
-    from dalembert.arithmetic.doubled_vectors import off
-    from dalembert.results.columns import Column, Table, names, number
+    from dalembert.results.columns import Column, Table, apart, names, number
 
     of, unit = recording.vectors, recording.unit
     rows = len(recording.sensors)
-    size = np.abs(of.vector)
 
-    def sizes() -> Any:
-        return off(size, recording.second.vector.vectors.size)
-
-    def deviations() -> Any:
-        return off(of.deviation, recording.second.deviation.doubled)
+    def column(name: str, values: NDArray[np.float64], exact: Callable[[], Doubled]) -> Column:
+        return Column(name, unit, values, apart(values, "number", "", exact), name, values)
 
     return Table(
         [
             names("sensor", recording.sensors),
             number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
-            Column("amplitude", unit, size, sizes, "amplitude", size),
+            column("amplitude", np.abs(of.vector), lambda: recording.second.vector.vectors.size),
             number(
                 "phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.vectors.degrees
             ),
-            Column(
-                "amplitude_uncertainty", unit, of.deviation, deviations, "amplitude_uncertainty", of.deviation
-            ),
+            column("amplitude_uncertainty", of.deviation, lambda: recording.second.deviation.doubled),
             names("turns", [of.turns] * rows),
         ],
         keys=("sensor",),
@@ -268,9 +258,7 @@ def vectors(recording: Recording) -> Table:
 
 def way(recording: Recording) -> list[Topic]:
     """The worked solution: one topic."""
-    import numpy as np
 
-    from dalembert.angles import degrees
     from dalembert.results.way import Topic, figures
     from dalembert.units import written
 
@@ -282,7 +270,7 @@ def way(recording: Recording) -> list[Topic]:
     ]
     entries = []
     for sensor, v in zip(recording.sensors, of.vector.tolist(), strict=True):
-        angle = float(degrees(np.array([v]))[0])
+        angle = degrees(v)
         text.append(
             f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {written(recording.unit)}"
         )

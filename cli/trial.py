@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cli.read.options import needed
 from cli.show.output import command
+from dalembert.results.columns import Table, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.units import G0
 
@@ -42,7 +43,6 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     def suggestion() -> Table:
         from balancing import trial_unbalance
         from balancing.trial import load_rule
-        from dalembert.results.columns import Table, names, number
 
         def exact() -> Doubled:
             from cli.read.exact import quantity, written

@@ -26,6 +26,16 @@ _PLAIN = str.maketrans(
 """Signs of word processors and web pages as they stand on a keyboard."""
 
 
+def last_place(number: str) -> int:
+    """Return the power of ten at which the last figure of a decimal number stands, as a file or an option writes it.
+
+    >>> last_place("0.250"), last_place("1,2e−3"), last_place("70"), last_place("1.5e3")
+    (-3, -4, 0, 2)
+    """
+    mantissa, _, exponent = number.translate(_PLAIN).replace(",", ".").lower().partition("e")
+    return int(exponent or 0) - len(mantissa.strip().partition(".")[2])
+
+
 @dataclass(frozen=True)
 class Typed:
     """A number as it was typed, and its unit behind it."""

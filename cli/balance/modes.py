@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -151,27 +151,13 @@ def _by_mode(source: Source) -> Source:
     if not modes:
         raise DataError(f"{source.file}: no column of a mode: expected z_* and a column for each mode")
     source.check_cells([place, *modes])
-    names = ["mode", source.headings[place].written, "shape"]
-    records = [
-        (line, [source.headings[k].written.removeprefix("mode_"), cells[place], cells[k]])
-        for line, cells in source.rows()
-        for k in modes
+    named = {k: source.headings[k].written.removeprefix("mode_") for k in modes}
+    rows = [
+        (line, [name, cells[place], cells[k]]) for line, cells in source.rows() for k, name in named.items()
     ]
-    records.sort(
-        key=lambda record: [source.headings[k].written.removeprefix("mode_") for k in modes].index(
-            record[1][0]
-        )
-    )
+    rows.sort(key=lambda row: list(named.values()).index(row[1][0]))
     headings = [Heading("mode", "mode"), source.headings[place], Heading("shape", "shape")]
-    return replace(
-        source,
-        headings=headings,
-        records=[(0, names), *records],
-        sheet=None,
-        above=0,
-        units_below=False,
-        unnamed_first=False,
-    )
+    return source.laid_out(headings, rows)
 
 
 def _stem(heading: Heading) -> str:

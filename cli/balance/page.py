@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import correct
+from balancing import correct, modal_corrections
 from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
 from cli.show.picture import blank
 from dalembert.decimals import decimal_to_si
 from dalembert.errors import DataError
+from dalembert.page import sheet as sheet_page
 from dalembert.page import spelled
 from dalembert.units import UNITS, from_si, to_si
 
@@ -63,8 +64,6 @@ def _rotors(balancing: Balancing) -> Iterator[KnownMasses]:
 
 def _shares(b: Balancing, rotor: int) -> Any:
     """Return what each unbalance alone asks of the planes, with its sign turned, (m, p)."""
-    from balancing import modal_corrections
-
     fix, i = b.modal_of(rotor)
     moment = np.diag(b.rotors.moment[b.masses_of(rotor)])
     return -modal_corrections(moment, b.conditions_at_masses(rotor), fix.at_planes[i]).unbalance
@@ -124,7 +123,6 @@ def sheet(b: Balancing) -> Page:
     from balancing.known_masses import known_masses as tapes_of
     from balancing.modal import shape_pieces
     from dalembert.arithmetic.engines.javascript import engine, written
-    from dalembert.page import sheet as sheet_page
 
     rotors, request = b.rotors, b.request
     if len(rotors.names) > OF_PAGE:

@@ -17,9 +17,10 @@ from dalembert.results.columns import Column, Table, apart, names, number, read_
 from dalembert.units import UNITS, from_si
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from cli.balance.rotors import Complex, Real
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
 
 
 NEAR = 20.0  # from this growth of errors on the planes are named as near each other
@@ -88,40 +89,28 @@ def corrections(b: Balancing) -> Table:
     z_unit = read["z"].unit if "z" in read else planes.z_unit
     radius, gravity = b.radius, b.request.gravity
 
-    def wrong(shown: Real, dimension: str, unit: str, exact: Callable[[Vectors], Doubled]) -> Real:
-        """The errors of sizes as they are before they are rounded to a step."""
-        return apart(shown, dimension, unit, lambda: exact(b.exact))()
+    def wrong(dimension: str, unit: str, arm: ArrayLike = 1.0, g: float = 1.0) -> Callable[[], Real]:
+        """The errors of unbalances over an arm, times g, as they are before they are rounded to a step."""
 
-    def mass_of(w: Vectors) -> Doubled:
-        from cli.read.exact import writtens
+        def exact() -> Doubled:
+            from cli.read.exact import writtens
 
-        return w.size / writtens(radius)
+            return b.exact.size / writtens(arm) * writtens(g)
 
-    def weight_of(w: Vectors) -> Doubled:
-        from cli.read.exact import writtens
-
-        return mass_of(w) * writtens(gravity)
+        si = np.abs(b.ideal) / np.where(np.asarray(arm) > 0, arm, np.nan) * g
+        return apart(from_si(si, dimension, unit), dimension, unit, exact)
 
     def turn() -> Real:
         return (-b.exact).turned(-b.ideal) if b.request.remove else b.exact.turned(b.ideal)
 
-    size, masses = np.abs(b.ideal), np.abs(b.ideal) / np.where(radius > 0, radius, np.nan)
     unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit
     unbalance = number("unbalance", "unbalance", b.unbalance, unit)
     if b.request.mass_step is not None:
         unbalance.values = b.mass * _arms(radius, mass_unit, unit)
-    unbalance.error = lambda: wrong(
-        from_si(size, "unbalance", unit), "unbalance", unit, lambda w: w.size
-    ).tolist()
-    weight = number(
-        "weight", "force", b.mass_kg * gravity, error=lambda: wrong(masses * gravity, "force", "N", weight_of)
-    )
-    mass = read_number("mass", "mass", b.mass, rotors.mass_unit)
-    mass.error = lambda: np.where(
-        np.isnan(b.given_mass),
-        wrong(from_si(masses, "mass", mass_unit), "mass", mass_unit, mass_of),
-        0.0,
-    ).tolist()
+    unbalance.error = wrong("unbalance", unit)
+    weight = number("weight", "force", b.mass_kg * gravity, error=wrong("force", "N", radius, gravity))
+    mass, of_mass = read_number("mass", "mass", b.mass, mass_unit), wrong("mass", mass_unit, radius)
+    mass.error = lambda: np.where(np.isnan(b.given_mass), of_mass(), 0.0)
     at = np.full(len(row), np.nan) if planes.z is None else planes.z[row]
     z = number("z", "length", at, z_unit)
     columns = [

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 
 COMPONENTS = ("x", "y", "zx", "zy")
+SHOWN = 6
+"""The largest number of terms of a sum in the text."""
 
 
 class Scale:
@@ -240,7 +242,7 @@ def _plane_topic(
     mass = abs(made) / radius if radius else 0.0
     x, y = (value + 0.0 for value in (made.real, made.imag))
     q = quadrant(x, y)
-    angle = float(degrees(np.array([made]))[0])
+    angle = degrees(made)
     amount = (
         f"W = {figures(mass * b.request.gravity)} N"
         if b.rotors.weights
@@ -276,10 +278,6 @@ def _plane_topic(
         ],
     )
     return Topic(f"plane {name}", [*lines, table], heading)
-
-
-SHOWN = 6
-"""The largest number of terms of a sum in the text."""
 
 
 def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: int) -> list[Topic]:

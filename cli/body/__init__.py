@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -130,8 +131,6 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
 
 def _inertias(file: str) -> Result:
-    from pathlib import Path
-
     from cli.body.inertias import checks, table, warnings
     from cli.formats import read_robot
     from cli.show.result import Result

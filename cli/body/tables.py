@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cli.body.moving import AXES, Array, CorrectionMass, MovingBody
+from cli.body.moving import AXES, CorrectionMass, MovingBody
 from cli.read.parts import SEVERAL
 from cli.show.picture import blank
 from dalembert.angles import degrees
@@ -83,37 +83,25 @@ def _entry(
 def _of_body(b: MovingBody) -> Iterator[Entry]:
     yield _entry(b, "mass", "mass", lambda b: b.body.mass)
     yield _entry(b, "center", "length", lambda b: b.body.center)
-    for i, letter in enumerate("xyz"):
-        yield _entry(b, f"inertia_{letter}", "inertia", partial(_tensor_row, i), f"inertia.{i}", "inertia")
+    tensors: dict[str, Part] = {"inertia": lambda b, i: b.body.inertia[i]}
     if b.request.about is not None:
+        tensors["inertia_about"] = lambda b, i: b.body.about(b.point)[i]
+    for name, row in tensors.items():
         for i, letter in enumerate("xyz"):
-            name, place = f"inertia_about_{letter}", f"inertia_about.{i}"
-            yield _entry(b, name, "inertia", partial(_tensor_row_about, i), place, "inertia_about")
+            yield _entry(b, f"{name}_{letter}", "inertia", _numbered(row, i), f"{name}.{i}", name)
     yield Entry("principal", "inertia", lambda: b.body.principal.moments, lambda: b.principal_errors[0])
     for i in range(3):
-        name, place = f"principal_axis_{i + 1}", f"principal_axes.{i}"
-        axis, error = partial(_axis, b, i), partial(_axis_error, b, i)
-        yield Entry(name, "number", axis, error, place, "principal_axes")
+        axis = partial(_numbered(lambda b, k: b.body.principal.axes[k], i), b)
+        error = partial(_numbered(lambda b, k: b.principal_errors[1][k], i), b)
+        yield Entry(f"principal_axis_{i + 1}", "number", axis, error, f"principal_axes.{i}", "principal_axes")
 
 
-def _tensor_row(i: int, b: MovingBody) -> Array:
-    row: Array = b.body.inertia[i]
-    return row
+Part: TypeAlias = Callable[[MovingBody, int], Any]
+"""A row of a matrix of a body, or what one of its bearings bears, by its number."""
 
 
-def _tensor_row_about(i: int, b: MovingBody) -> Array:
-    row: Array = b.body.about(b.point)[i]
-    return row
-
-
-def _axis(b: MovingBody, i: int) -> Array:
-    row: Array = b.body.principal.axes[i]
-    return row
-
-
-def _axis_error(b: MovingBody, i: int) -> Array:
-    row: Array = b.principal_errors[1][i]
-    return row
+def _numbered(part: Part, i: int) -> Callable[[MovingBody], Any]:
+    return lambda b: part(b, i)
 
 
 def _of_motion(b: MovingBody) -> Iterator[Entry]:
@@ -130,25 +118,16 @@ def _of_motion(b: MovingBody) -> Iterator[Entry]:
 
 def _of_shaft(b: MovingBody) -> Iterator[Entry]:
     """Forces of the bearings across the axis; the first takes the axial force."""
+    forces: dict[str, Part] = {
+        "static": lambda b, i: b.static_force(i),
+        "dynamic": lambda b, i: b.drawn(b.shaft.dynamic[i]),
+    }
+    if b.correction is not None:
+        forces["corrected"] = lambda b, i: b.drawn(b.corrected[i])
     for i in range(2):
-        name = f"bearing{i + 1}"
-        yield _entry(b, f"{name}_static", "force", partial(_static, i), None, name)
-        yield _entry(b, f"{name}_dynamic", "force", partial(_dynamic, i), None, name)
-        if b.correction is not None:
-            yield _entry(b, f"{name}_corrected", "force", partial(_corrected, i), None, name)
+        for kind, of in forces.items():
+            yield _entry(b, f"bearing{i + 1}_{kind}", "force", _numbered(of, i), None, f"bearing{i + 1}")
     yield _entry(b, "drive_torque", "torque", lambda b: b.shaft.drive_torque, None)
-
-
-def _static(i: int, b: MovingBody) -> Array:
-    return b.static_force(i)
-
-
-def _dynamic(i: int, b: MovingBody) -> Array:
-    return b.drawn(b.shaft.dynamic[i])
-
-
-def _corrected(i: int, b: MovingBody) -> Array:
-    return b.drawn(b.corrected[i])
 
 
 CORRECTIONS = "corrections"

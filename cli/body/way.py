@@ -17,7 +17,7 @@ from cli.read.parts import SEVERAL, bodies_of
 from dalembert.results.columns import Column, Table, listed, names, number, vector
 from dalembert.results.way import Topic, figures
 from dalembert.tables.table import Table as ReadTable
-from rigidbody3d.inertia import free_axes, own_axes
+from rigidbody3d.inertia import free_axes, own_axes, shift
 
 if TYPE_CHECKING:
     from cli.body.moving import Array
@@ -67,8 +67,6 @@ def _inertia(b: MovingBody) -> Topic:
         np.atleast_2d(each.center),
         np.reshape(each.inertia, (-1, 3, 3)),
     )
-    from rigidbody3d.inertia import shift
-
     moved = own + shift(mass, center - body.center)
     columns = [
         names("part", list(b.parts.name)),

@@ -58,7 +58,7 @@ class Entry(NamedTuple):
         """Return the product with its numbers: `W3·V3 = (0, −30)·(300, 200) = −6 000 W`."""
         if self.force is not None and self.velocity is not None:
             f, v = self.force, self.velocity
-            product = f"{vector_text(f.real, f.imag)}·{vector_text(v.real, v.imag)}"
+            product = f"{vector_text(f)}·{vector_text(v)}"
         else:
             omega = figures(self.omega or 0.0)
             product = f"{figures(self.torque or 0.0)}·{f'({omega})' if omega.startswith('−') else omega}"

@@ -21,7 +21,7 @@ from balancing.engine import (
 from cli.read import options
 from cli.read.rotor_options import Planes
 from dalembert.angles import phasor
-from dalembert.arithmetic.shapes import as_array
+from dalembert.arithmetic.shapes import as_array, in_32_digits
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
 from dalembert.units import find_unit
@@ -58,7 +58,6 @@ class Cylinders:
     def in_32_digits(self) -> Cylinders:
         """The cylinders in 32 digits, with the decimals of the table exact."""
         from cli.read.exact import as_written
-        from dalembert.arithmetic.shapes import in_32_digits
 
         numbers: dict[str, Any] = {
             name: as_written(self.table.numbers[name])

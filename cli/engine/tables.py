@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.engine import Forces, piston_orders, reciprocating_forces
+from balancing.engine import Forces, piston_orders
 from cli.engine.cylinders import Engine
 from cli.show.picture import blank
 from dalembert.angles import degrees
@@ -15,7 +15,7 @@ from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.amounts import prefixed
 from dalembert.drawing.polar import head
 from dalembert.drawing.sheet import plain, sheet
-from dalembert.results.columns import Column, Table, names, number
+from dalembert.results.columns import Column, Table, computed, names, number
 from dalembert.results.way import Topic, figures
 
 if TYPE_CHECKING:
@@ -33,6 +33,10 @@ METHOD = (
 )
 
 
+KINDS = (("force", "force", False), ("couple", "torque", True))
+"""Forces and couples: their name, their dimension, and whether they are couples."""
+
+
 def tables(e: Engine) -> dict[str, Callable[[], Table]]:
     """The tables of a result, the CSV's first."""
     result: dict[str, Callable[[], Table]] = {"orders": lambda: orders(e), "rotating": lambda: rotating(e)}
@@ -44,80 +48,54 @@ def tables(e: Engine) -> dict[str, Callable[[], Table]]:
 
 
 Of = Callable[[Engine], Any]
-"""A number of an engine, of floats or in 32 digits."""
-
-
-def one(e: Engine, name: str, dimension: str, of: Of, unit: str = "", place: str | None = "") -> Column:
-    """A quantity: its errors are by what it differs from the second run, in 32 digits."""
-    return number(name, dimension, of(e), unit, place=place, exact=lambda: of(e.second).doubled)
+"""Numbers of an engine, of floats or in 32 digits."""
 
 
 def polar(e: Engine, name: str, dimension: str, of: Of, unit: str = "", angle: str = "angle") -> list[Column]:
     """Sizes and angles of vectors."""
     return [
-        one(e, name, dimension, lambda e: np.abs(of(e)), unit),
+        computed(e, name, dimension, lambda e: np.abs(of(e)), unit),
         number(angle, "angle", degrees(of(e)), exact=lambda: of(e.second).vectors.degrees),
     ]
 
 
-def coefficients(e: Engine, forces: Callable[[Engine], Forces]) -> list[Column]:
-    """The coefficients of cos kθ and sin kθ of the force and the couple."""
-    columns = []
-    for name, dimension, couple in (("force", "force", False), ("couple", "torque", True)):
+def by_order(e: Engine, forces: str, further: Sequence[Column] = ()) -> list[Column]:
+    """The largest force and couple of each order over a turn, and their coefficients of cos kθ and sin kθ."""
+    columns = [names("order", list(range(1, e.highest + 1))), *largest(e, forces), *further]
+    for name, dimension, couple in KINDS:
         for i, axis in enumerate("xy"):
             for j, part in enumerate(("cos", "sin")):
 
                 def of(e: Engine, couple: bool = couple, i: int = i, j: int = j) -> Any:
-                    return forces(e).coefficients(couple)[:, i, j]
+                    return getattr(e, forces).coefficients(couple)[:, i, j]
 
-                column = one(e, f"{name}_{axis}_{part}", dimension, of)
+                column = computed(e, f"{name}_{axis}_{part}", dimension, of)
                 column.place = f"{name}_{column.unit}.{axis}.{j}"
                 columns.append(column)
     return columns
 
 
-def largest(
-    e: Engine, forces: Callable[[Engine], Forces], prefix: str = "", place: str | None = ""
-) -> list[Column]:
-    """The largest force and couple of each order over a turn."""
-    return [
-        one(e, f"{prefix}force_max", "force", lambda e: forces(e).largest(), place=place),
-        one(e, f"{prefix}couple_max", "torque", lambda e: forces(e).largest(couple=True), place=place),
-    ]
+def largest(e: Engine, forces: str, prefix: str = "", place: str | None = "") -> list[Column]:
+    def column(name: str, dimension: str, couple: bool) -> Column:
+        return computed(
+            e, f"{prefix}{name}_max", dimension, lambda e: getattr(e, forces).largest(couple), place=place
+        )
 
-
-def of_reciprocating(e: Engine) -> Forces:
-    """The forces of the reciprocating masses."""
-    return e.reciprocating
-
-
-def of_residual(e: Engine) -> Forces:
-    """All that shakes the frame."""
-    return e.residual
+    return [column(*kind) for kind in KINDS]
 
 
 def orders(e: Engine) -> Table:
     """A row for each order."""
-    columns = [
-        names("order", list(range(1, e.highest + 1))),
-        *largest(e, of_reciprocating),
-        *(largest(e, of_residual, "residual_", None) if e.balanced or e.rotating.any() else []),
-        *coefficients(e, of_reciprocating),
-    ]
+    further = largest(e, "residual", "residual_", None) if e.balanced or e.rotating.any() else []
     above = "forces on the frame and couples about z = 0 of the reciprocating masses, coefficients of cos kθ and sin kθ:"
-    return Table(columns, ("order",), "orders[]", above)
+    return Table(by_order(e, "reciprocating", further), ("order",), "orders[]", above)
 
 
 def residual(e: Engine) -> Table:
     """The orders after counterweights and shafts, the rotating masses included."""
-    columns = [
-        names("order", list(range(1, e.highest + 1))),
-        *largest(e, of_residual),
-        *coefficients(e, of_residual),
-    ]
     kept = "reciprocating and rotating masses" + ", counterweights" * (e.counterweights is not None)
     above = f"{kept} and shafts together:" if e.shafts else f"{kept} together:"
-    return Table(columns, ("order",), "residual_orders[]", above)
+    return Table(by_order(e, "residual"), ("order",), "residual_orders[]", above)
 
 
 def rotating(e: Engine) -> Table:
@@ -142,16 +120,15 @@ def rotating(e: Engine) -> Table:
     )
 
 
-def of_weights(e: Engine) -> Any:
-    """The unbalances of the counterweights."""
-    return e.counterweights.unbalance  # type: ignore[union-attr]
-
-
 def counterweights(e: Engine) -> Table:
     """A row for each; none where none are wanted."""
     weights = e.counterweights
     if weights is None:
         return Table([], place="counterweights[]", documented=[names("counterweight", [])])
+
+    def of_weights(e: Engine) -> Any:
+        return e.counterweights.unbalance  # type: ignore[union-attr]
+
     columns = [
         names("counterweight", weights.names),
         number("z", "length", weights.z, e.cylinders.length_unit),
@@ -163,7 +140,7 @@ def counterweights(e: Engine) -> Table:
         def masses(e: Engine) -> Any:
             return np.abs(of_weights(e)) / e.planes.radius  # type: ignore[union-attr]
 
-        columns.append(one(e, "mass", "mass", masses, mass))
+        columns.append(computed(e, "mass", "mass", masses, mass))
     return Table(columns, ("counterweight",), "counterweights[]", "at θ = 0")
 
 
@@ -184,7 +161,7 @@ def locomotive(e: Engine) -> Table:
     """The first order as the driver of a locomotive and the track feel it."""
 
     def along(couple: bool) -> Of:
-        return lambda e: np.hypot(*e.residual.coefficients(couple)[0, 0])[None]
+        return lambda e: np.hypot(*e.residual.coefficients(couple)[0, 0])
 
     def blow(e: Engine) -> Any:
         each = np.abs(e.counterweights.for_reciprocating)  # type: ignore[union-attr]
@@ -192,9 +169,9 @@ def locomotive(e: Engine) -> Table:
 
     return Table(
         [
-            one(e, "tractive_effort", "force", along(False)),
-            one(e, "swaying_couple", "torque", along(True)),
-            one(e, "hammer_blow", "force", blow),
+            computed(e, "tractive_effort", "force", along(False)),
+            computed(e, "swaying_couple", "torque", along(True)),
+            computed(e, "hammer_blow", "force", blow),
         ],
         place="locomotive",
         above="variation of the tractive effort and swaying couple about z = 0 (±, first order), hammer blow of one wheel (±)",
@@ -350,20 +327,11 @@ def way(e: Engine) -> list[Topic]:
     )
     result = [Topic("orders", text, "Orders of each piston")]
     shares: list[list[float]] = []
+    f = e.reciprocating
     for i in range(len(names_of)):
-        one = slice(i, i + 1)
-        force = reciprocating_forces(
-            c.crank[one],
-            c.bank[one],
-            c.z[one],
-            c.throw[one],
-            c.rod[one],
-            c.reciprocating[one],
-            e.speed,
-            e.highest,
-        )
-        shares += force.coefficients()[used].reshape(-1, 4).tolist()
-    shares += e.reciprocating.coefficients()[used].reshape(-1, 4).tolist()
+        one = Forces(f.z[[i]], f.with_crank[[i]], f.against[[i]])
+        shares += one.coefficients()[used].reshape(-1, 4).tolist()
+    shares += f.coefficients()[used].reshape(-1, 4).tolist()
     every = [name for name in (*names_of, "sum") for _ in used]
     orders_of = [k + 1 for k in used]
     keys = [names("cylinder", every), _order(orders_of * (len(names_of) + 1))]

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import FILE, RANGES, WORKERS
+from cli.read.options import bad
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
 
     cases = Cases.of(options)
     if options.at:
-        from cli.read.options import bad
-
         raise bad(
             "--at",
             "equilibrium searches a range of the input: expected --over, such as --over 0deg:90deg:1deg",

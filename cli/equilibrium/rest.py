@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cli.cases.analysis import Analysis
-    from dalembert.results.way import Topic
     from virtualwork.study.equilibrium import Equilibria as Found
     from virtualwork.study.equilibrium import Equilibrium
 

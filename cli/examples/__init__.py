@@ -91,14 +91,12 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
 
 def _section(name: str, example: Mapping[str, str], files: Mapping[Path, tuple[bytes, str]]) -> Section:
     """Return what a report says of an example, and its files."""
-    from cli.show.report import CODE, LINES
+    from cli.show.report import CODE, text_of_file
     from cli.show.result import Section
 
     parts = [example["line"], f"source: {example['source']}", CODE + example["command"]]
     for here, (data, _) in files.items():
-        lines = data.decode().splitlines()
-        more = f"\n… and {len(lines) - LINES} further lines" if len(lines) > LINES else ""
-        parts += [f"{here}:", CODE + "\n".join(lines[:LINES]) + more]
+        parts += [f"{here}:", text_of_file(data)]
     return Section(name, parts)
 
 

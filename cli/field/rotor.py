@@ -258,7 +258,7 @@ def way(b: FieldBalancing) -> list[Topic]:
 
 
 def _angle(z: complex) -> float | None:
-    return None if z == 0 or z != z else float(degrees(np.array([z]))[0])
+    return None if z == 0 or z != z else degrees(z)
 
 
 def _parts(z: complex) -> dict[str, Any]:

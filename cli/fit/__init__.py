@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import FILE, VARIANTS, WORKERS
+from cli.read.options import bad
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.loop import result
     from cli.fit.fitting import STARTS, Fits, aims, bounds
     from cli.fit.targets import kept
-    from cli.read.options import bad
 
     for flag, value, example in (
         ("--want", options.want, "--want H"),

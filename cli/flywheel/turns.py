@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from decimal import Decimal, InvalidOperation
 from functools import cached_property
 from math import ceil, floor, pi
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,8 @@ from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.curves import Curve, panel, spread
 from dalembert.drawing.sheet import sheet
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table, names, number
+from dalembert.figures import last_place
+from dalembert.results.columns import Table, computed, names, number
 from dalembert.results.way import Topic, figures
 from dalembert.tables.table import Numbers, read
 from dalembert.tables.table import Table as ReadTable
@@ -129,14 +129,8 @@ def _whole_turns(table: ReadTable, angle: Numbers) -> int:
 
 def _digit(table: ReadTable) -> float:
     """Return the last printed digits of the ends together, at most a thousandth of a turn."""
-    total = 0.0
-    for row in (0, table.rows - 1):
-        try:
-            exponent = Decimal(table.written(row, "angle").replace(",", ".")).as_tuple().exponent
-        except InvalidOperation:
-            exponent = 0
-        total += 10.0 ** int(exponent) if exponent else 0.0
-    return min(total, 2 * pi / 1000)
+    places = [last_place(table.written(row, "angle")) for row in (0, table.rows - 1)]
+    return min(sum(10.0**place for place in places if place), 2 * pi / 1000)
 
 
 METHOD = (
@@ -150,33 +144,22 @@ def tables(wheel: Flywheel) -> dict[str, Callable[[], Table]]:
     return {"flywheel": lambda: results(wheel), "energy": lambda: energy(wheel)}
 
 
-def one(wheel: Flywheel, name: str, dimension: str, of: Callable[[Flywheel], Any], unit: str = "") -> Column:
-    """A quantity: its errors are by what it differs from the second run, in 32 digits."""
-    return number(
-        name,
-        dimension,
-        np.atleast_1d(of(wheel)),
-        unit,
-        exact=lambda: np.atleast_1d(of(wheel.second)).doubled,  # type: ignore[attr-defined]
-    )
-
-
 def results(wheel: Flywheel) -> Table:
     """One row."""
     unit, peak = wheel.torque_unit, int(np.argmax(np.abs(wheel.torque)))
     columns = [
-        one(wheel, "mean_torque", "torque", lambda w: w.cycle.mean, unit),
-        one(wheel, "work", "energy", lambda w: w.cycle.work),
-        one(wheel, "energy_fluctuation", "energy", lambda w: w.cycle.fluctuation),
-        one(wheel, "flywheel_inertia", "inertia", lambda w: w.inertia),
-        one(wheel, "peak_torque", "torque", lambda w: w.torque[peak], unit),
-        one(wheel, "peak_torque_angle", "angle", lambda w: w.angle[peak]),
-        one(wheel, "mean_power", "power", lambda w: w.cycle.mean * w.speed),
+        computed(wheel, "mean_torque", "torque", lambda w: w.cycle.mean, unit),
+        computed(wheel, "work", "energy", lambda w: w.cycle.work),
+        computed(wheel, "energy_fluctuation", "energy", lambda w: w.cycle.fluctuation),
+        computed(wheel, "flywheel_inertia", "inertia", lambda w: w.inertia),
+        computed(wheel, "peak_torque", "torque", lambda w: w.torque[peak], unit),
+        computed(wheel, "peak_torque_angle", "angle", lambda w: w.angle[peak]),
+        computed(wheel, "mean_power", "power", lambda w: w.cycle.mean * w.speed),
     ]
     if not wheel.constant:
         columns += [
-            one(wheel, "fastest_angle", "angle", lambda w: w.cycle.fastest * 180.0 / np.pi),
-            one(wheel, "slowest_angle", "angle", lambda w: w.cycle.slowest * 180.0 / np.pi),
+            computed(wheel, "fastest_angle", "angle", lambda w: w.cycle.fastest * 180.0 / np.pi),
+            computed(wheel, "slowest_angle", "angle", lambda w: w.cycle.slowest * 180.0 / np.pi),
         ]
     turns = "one turn" if wheel.turns == 1 else f"{wheel.turns} turns"
     return Table(columns, place="", above=f"over {turns} of the shaft, against a constant load:", documented=[names("turns", [wheel.turns])])  # fmt: skip
@@ -190,9 +173,9 @@ def energy(wheel: Flywheel) -> Table:
         return E if is_doubled(E) else np.where(np.abs(E) > w.cycle.negligible, E, 0.0)
 
     columns = [
-        one(wheel, "angle", "angle", lambda w: w.angle),
-        one(wheel, "torque", "torque", lambda w: w.torque, wheel.torque_unit),
-        one(wheel, "energy", "energy", stored),
+        computed(wheel, "angle", "angle", lambda w: w.angle),
+        computed(wheel, "torque", "torque", lambda w: w.torque, wheel.torque_unit),
+        computed(wheel, "energy", "energy", stored),
     ]
     return Table(columns, ("angle_deg",), "cycle[]", "of the flywheel, from zero in the first row")
 

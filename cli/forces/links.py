@@ -293,8 +293,8 @@ def _motors(analysis: Analysis) -> list[Topic]:
         torque = [] if j is None else listed(effort[:, j])
         text = [
             f"m′ = {figures(link.mass)} + {figures(motor.mass)} = {figures(whole.mass)} kg",
-            f"r_G′ = (m·r_G + m_M·r_M)/m′ = ({figures(link.mass)}·{_vector_of(link.center)} + "
-            f"{figures(motor.mass)}·{_vector_of(motor.center)})/{figures(whole.mass)} = {_vector_of(whole.center)} m in the link's axes",
+            f"r_G′ = (m·r_G + m_M·r_M)/m′ = ({figures(link.mass)}·{vector_text(link.center)} + "
+            f"{figures(motor.mass)}·{vector_text(motor.center)})/{figures(whole.mass)} = {vector_text(whole.center)} m in the link's axes",
             f"I_G′ = I_G + m·|r_G − r_G′|² + m_M·|r_M − r_G′|² = {figures(whole.inertia)} kg·m²",
         ]
         if torque and torque[0] is not None:
@@ -312,10 +312,6 @@ def _motors(analysis: Analysis) -> list[Topic]:
         title = f"Link {motor.carrier} with the motor of {motor.drives} (Ibrahim §2.3)"
         motors.append(Topic("motor", text, title, head))
     return motors
-
-
-def _vector_of(z: complex) -> str:
-    return vector_text(z.real, z.imag)
 
 
 def _free_bodies(analysis: Analysis) -> list[Topic]:

@@ -10,8 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from cli.formats import markup as xml
-from cli.formats.mjcf_bodies import Defaults, Frames, Masses
-from cli.formats.mjcf_ties import Ties, leading
+from cli.formats.mjcf_model import Defaults, Frames, Masses, Ties, leading
 from cli.formats.robot import (
     GROUND,
     LIGHT,

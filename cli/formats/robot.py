@@ -14,6 +14,7 @@ from cli.formats.markup import At
 from cli.formats.values import MOST_LINKS, check_count
 from cli.read.turning import turned
 from dalembert.errors import DataError
+from dalembert.figures import last_place
 
 if TYPE_CHECKING:
     from virtualwork.describe.meshes import Gear
@@ -199,11 +200,8 @@ def half_unit(word: str) -> float:
     >>> half_unit("0.250"), half_unit("1.2e-3"), half_unit("0.0"), half_unit("12")
     (0.0005, 5e-05, 0.0, 0.0)
     """
-    digits, _, exponent = word.lower().partition("e")
-    places = len(digits.partition(".")[2])
-    if float(digits) == 0 or not (places or exponent):
-        return 0.0
-    return float(f"0.5e{int(exponent or 0) - places}")
+    place = last_place(word)
+    return 0.0 if float(word) == 0 or not (place or "e" in word.lower()) else float(f"0.5e{place}")
 
 
 def symmetric(entries: Mapping[str, float]) -> Array:

@@ -246,11 +246,11 @@ def way(p: Positions) -> list[Topic]:
     text: list[str | Table] = [
         "v = mandrel + rotor·e^{i·turned} (ISO 21940-14); ē and v̄ are the means over all positions, D = Σ|e − ē|²:",
         table,
-        f"  v̄ = {vector_text(mean.real, mean.imag)}, ē = {vector_text(turn.real, turn.imag)}, D = {figures(spread)}",
+        f"  v̄ = {vector_text(mean)}, ē = {vector_text(turn)}, D = {figures(spread)}",
     ]
     numbers = [
-        f"rotor = Σ (e − ē)*·v/D = {vector_text(rotor.real, rotor.imag)} {p.unit_text}: {figures(abs(rotor))} at {figures(float(degrees(np.array([rotor]))[0]))}°",
-        f"mandrel = v̄ − ē·rotor = {vector_text(mandrel.real, mandrel.imag)} {p.unit_text}: {figures(abs(mandrel))} at {figures(float(degrees(np.array([mandrel]))[0]))}°",
+        f"rotor = Σ (e − ē)*·v/D = {vector_text(rotor)} {p.unit_text}: {figures(abs(rotor))} at {figures(degrees(rotor))}°",
+        f"mandrel = v̄ − ē·rotor = {vector_text(mandrel)} {p.unit_text}: {figures(abs(mandrel))} at {figures(degrees(mandrel))}°",
     ]
     head = {"unit": unit, "rotor": [rotor.real, rotor.imag], "mandrel": [mandrel.real, mandrel.imag]}
     return [

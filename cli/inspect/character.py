@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 
     from cli.show.result import Result
     from dalembert.results.columns import Cell
-    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.formulas.quantity import Quantity
-    from virtualwork.study.check import Check
     from virtualwork.study.strokes import Stroke
 
 

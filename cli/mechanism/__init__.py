@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
+import typer
+
 from cli.cases import BRANCH, CASES, FILE, WORKERS
 from cli.show.output import command
 
@@ -31,8 +33,6 @@ Further options (docs/commands.md describes them):
 def print_schema(_: bool) -> None:
     """Print the JSON Schema of a mechanism's file."""
     import json
-
-    import typer
 
     from virtualwork.describe.schema import schema
 

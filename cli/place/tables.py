@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from balancing import drill_depth
 from balancing.picture import Places, places
+from balancing.weights import angles_again
 from cli.place.placing import Drill, Placed, Placing, Share
 from cli.show.picture import blank
 from dalembert.angles import degrees, phasor
@@ -221,7 +223,6 @@ class SecondRun:
 
     def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
         """Return the masses of a plane and their angles in degrees, (n,) each."""
-        from balancing.weights import angles_again
         from cli.read.exact import writtens
         from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
@@ -243,7 +244,6 @@ class SecondRun:
 
 def _depth(mass: Doubled, drill: Drill) -> Doubled:
     """The depth of a hole in 32 digits."""
-    from balancing import drill_depth
     from cli.read.exact import written
     from dalembert.arithmetic.doubled import PI, Doubled
     from dalembert.arithmetic.doubled_arrays import DoubledArray
@@ -311,10 +311,10 @@ def way(p: Placing, name: str = "") -> list[Topic]:
         )
     )
     size = float(from_si(abs(p.target), "mass", unit))
-    angle = float(degrees(np.array([p.target]))[0])
+    angle = degrees(p.target)
     text.append(f"  together {figures(size)} {unit} at {figures(angle)}°")
     if goal != p.target:
-        other = float(degrees(np.array([goal]))[0])
+        other = degrees(goal)
         text.append(
             f"  to be made on the places: {figures(float(from_si(abs(goal), 'mass', unit)))} {unit} at {figures(other)}°"
         )
@@ -340,7 +340,7 @@ def way(p: Placing, name: str = "") -> list[Topic]:
 
         def shown(z: complex) -> str:
             scaled = z * float(from_si(1.0, "mass", unit))
-            return f"{vector_text(scaled.real, scaled.imag)} {unit}"
+            return f"{vector_text(scaled)} {unit}"
 
         words: list[str | Table] = [
             f"Σ m·e^(iθ) of the masses{at} and the correction:",

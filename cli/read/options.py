@@ -12,6 +12,7 @@ import typer
 from dalembert.angles import in_turn
 from dalembert.errors import DataError, toml_text
 from dalembert.hints import nearest
+from dalembert.units import SMALLEST, UNITS, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -75,7 +76,6 @@ def column_names(pairs: list[str] | None) -> dict[str, str]:
 def _read(flag: str, text: str, dimension: str, positive: bool) -> tuple[float, str]:
     # a help reads no quantities
     from dalembert.quantities import parse_quantity
-    from dalembert.units import SMALLEST
 
     try:
         value, unit = parse_quantity(text, dimension)
@@ -87,8 +87,6 @@ def _read(flag: str, text: str, dimension: str, positive: bool) -> tuple[float, 
 
 
 def _in_si(value: float, dimension: str, unit: str) -> float:
-    from dalembert.units import UNITS, to_si
-
     # without a unit it is in SI
     return float(to_si(value, dimension, unit or next(iter(UNITS[dimension]))))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,12 +14,14 @@ from numpy.typing import NDArray
 from cli.read.turning import TURNS, along, rotation_of, turned, vectors
 from dalembert.angles import cosine_sine
 from dalembert.errors import DataError, needs, quote
+from dalembert.figures import last_place
 from dalembert.hints import nearest
 from dalembert.tables.files import note
 from dalembert.tables.table import Table, read
 from dalembert.units import UNITS, to_si
 from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
 from rigidbody3d.shapes import SHAPES
+from rigidbody3d.solids import Solid, of_tensor
 
 if TYPE_CHECKING:
     from rigidbody3d.solids import Solid
@@ -142,8 +143,6 @@ class _Unturned:
 
     def solids(self) -> list[Solid]:
         """Return what they look like."""
-        from rigidbody3d.solids import Solid, of_tensor
-
         solids = []
         for i, (shape, row) in enumerate(zip(self.shapes, self.rows, strict=True)):
             if shape == TENSOR:
@@ -347,10 +346,9 @@ def _last_digit(table: Table, index: int) -> float:
     digits = [0.0]
     for key in (*MOMENTS, *PRODUCTS):
         if key in table.numbers:
-            written = re.match(r"[+-]?\d*[.,](\d*)(?:[eE]([+-]?\d+))?", table.written(index, key))
-            if written is not None:
-                power = int(written.group(2) or 0) - len(written.group(1))
-                digits.append(float(to_si(10.0**power, "inertia", table.numbers[key].unit)))
+            written = table.written(index, key)
+            if "." in written or "," in written:
+                digits.append(float(to_si(10.0 ** last_place(written), "inertia", table.numbers[key].unit)))
     return max(digits)
 
 

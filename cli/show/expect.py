@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dalembert.errors import DataError
+from dalembert.figures import last_place
 from dalembert.hints import nearest
 from dalembert.quantities import is_number, parse_number
 from dalembert.results.columns import Column, Table
@@ -256,14 +257,8 @@ def _nearest(c: _Expected, column: Values, rows: list[int], wanted: str, rtol: f
 
 
 def _half_unit(number: str) -> float:
-    """Half a unit of the last digit of a decimal number.
-
-    >>> _half_unit("70"), _half_unit("0.25"), _half_unit("1.5e3")
-    (0.5, 0.005, 50.0)
-    """
-    mantissa, _, exponent = number.lower().partition("e")
-    decimals = len(mantissa.partition(".")[2])
-    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+    """Half a unit of the last digit of a decimal number."""
+    return 0.5 * 10.0 ** last_place(number)
 
 
 def _error(c: _Expected, value: Cell, wanted: str, column: Values) -> tuple[Cell, float]:

@@ -17,7 +17,7 @@ from cli.show.result import Written, chosen_units, finished
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError, needs
 from dalembert.results.columns import Table
-from dalembert.results.text import Grid, has_names, plain, printed
+from dalembert.results.text import Grid, csv_text, has_names, json_elements, json_members, plain, printed
 from dalembert.tables.files import is_input
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cli.show.commands import ShowOptions
     from cli.show.result import Part, Result
-    from dalembert.results.columns import Column, Table, Values
+    from dalembert.results.columns import Column, Values
 
 
 def write_all(files: Mapping[Path, Callable[[], bytes | Iterable[bytes]]]) -> None:
@@ -264,13 +264,9 @@ class Form:
     def __call__(self, table: Part, number: int) -> Written:
         """Make it of the part of this number, from 0 on."""
         if isinstance(table, list):
-            from dalembert.results.json_text import json_elements
-
             return Written(json_elements(table, first=number == 0).encode(), 0)
         table, unknown = finished(table, self.units, self.digits)
         if self.suffix == ".csv":
-            from dalembert.results.text import csv_text
-
             return Written(csv_text(table.cells, header=number == 0).encode(), unknown)
         # bounds of errors have done their work, and cannot be sent; an array of numbers is soon sent
         columns = [replace(c, values=self._sent(c), error=None) for c in table.columns]
@@ -325,8 +321,6 @@ def stream(result: Result, suffix: str, options: ShowOptions) -> int:
 
 def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
     """The JSON document around its list."""
-    from dalembert.results.json_text import json_members
-
     yield f'{{{json_members(result.documented())},\n "{result.blocks_name}": ['.encode()
     yield from parts
     # all warnings are there by now

@@ -325,7 +325,7 @@ def _unknown(count: int) -> list[str]:
 
 
 def _json_parts(result: Result) -> Iterator[str]:
-    from dalembert.results.json_text import json_parts
+    from dalembert.results.text import json_parts
 
     return json_parts({**result.documented(), "warnings": result.warnings})
 
@@ -383,8 +383,6 @@ def _taking() -> Iterator[list[Result]]:
 @cache
 def _runner(name: str) -> Callable[[Sequence[str]], Any]:
     """Return what runs a command on the words behind its name."""
-    import typer
-
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     app.command(name)(import_module(f"cli.{name}").run)
     built = typer.main.get_command(app)
@@ -394,8 +392,6 @@ def _runner(name: str) -> Callable[[Sequence[str]], Any]:
 @cache
 def options_of(name: str) -> frozenset[str]:
     """Return the options that a command takes."""
-    import typer
-
     app = typer.Typer(add_completion=False)
     app.command(name)(import_module(f"cli.{name}").run)
     return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)

@@ -148,10 +148,8 @@ def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[s
     for path in files:
         shown = name_of(path)
         if path.lower().endswith(".toml") or (path == "-" and _is_toml()):
-            lines = load(path).decode("utf-8-sig").splitlines()
-            more = f"\n… and {len(lines) - LINES} further lines" if len(lines) > LINES else ""
             yield f"{shown}:"
-            yield CODE + "\n".join(lines[:LINES]) + more
+            yield text_of_file(load(path))
             continue
         source = open_source(path, {}, None)
         rows = source.rows()
@@ -167,6 +165,13 @@ def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[s
 
 CODE = "\0"
 """What a paragraph begins with that is the text of a file."""
+
+
+def text_of_file(data: bytes) -> str:
+    """Return the paragraph that shows a file, of a long one the first lines."""
+    lines = data.decode("utf-8-sig").splitlines()
+    more = f"\n… and {len(lines) - LINES} further lines" if len(lines) > LINES else ""
+    return CODE + "\n".join(lines[:LINES]) + more
 
 
 def _is_toml() -> bool:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.read.root_search import Found
-    from dalembert.results.columns import Column, Document, Json, Table, Values
+    from dalembert.results.columns import Column, Document, Json, Values
     from dalembert.results.way import Topic
 
     Part: TypeAlias = "Table | list[Document]"

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import BRANCH, CASES, FILE, WORKERS
+from cli.read.options import bad, time_range
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.read.options import bad
     from cli.simulate.motion import Simulation
 
     if options.time is None:
@@ -55,8 +55,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
 
 def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], float]:
     """Read the times and the accuracy."""
-    from cli.read.options import bad, time_range
-
     times = time_range("--time", time)
     if len(times) > 1 and times[1] < times[0]:
         raise bad("--time", f"'{time}': expected rising times")

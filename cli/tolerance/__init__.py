@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from cli.cases import CASES, FILE, WORKERS
+from cli.read.options import bad
 from cli.show.output import command
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.cases.analysis import unknown
     from cli.cases.cases import Cases
     from cli.cases.loop import result
-    from cli.read.options import bad
     from cli.tolerance.spread import Spreads
     from dalembert.dataclass import replace
     from virtualwork.quantities import places

@@ -171,6 +171,19 @@ def apart(
     return errors
 
 
+def computed(
+    subject: Any, name: str, dimension: str, of: Callable[[Any], Any], unit: str = "", place: Place = ""
+) -> Column:
+    """A quantity that is computed twice: `of` a subject, and of its `second`, the same in 32 digits."""
+    import numpy as np
+
+    def exact() -> Doubled:
+        again: Any = np.atleast_1d(of(subject.second))
+        return again.doubled  # type: ignore[no-any-return]
+
+    return number(name, dimension, np.atleast_1d(of(subject)), unit, place=place, exact=exact)
+
+
 def vector(
     name: str,
     dimension: str,

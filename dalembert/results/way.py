@@ -72,10 +72,10 @@ def figures(value: float) -> str:
     return text.replace("-", "−").replace("\u2009", " ")
 
 
-def vector_text(x: float, y: float) -> str:
+def vector_text(z: complex) -> str:
     """Return a vector of the plane as it stands in an equation: `(300, 200)`.
 
-    >>> vector_text(300.0, -200.0)
+    >>> vector_text(300 - 200j)
     '(300, −200)'
     """
-    return f"({figures(x)}, {figures(y)})"
+    return f"({figures(z.real)}, {figures(z.imag)})"

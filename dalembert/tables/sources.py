@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING
 
-from dalembert.dataclass import dataclass, field
+from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError, cell_error, quote
 from dalembert.quantities import is_number
 from dalembert.tables.files import is_workbook, read_bytes, remember, split_sheet
@@ -96,6 +96,19 @@ class Source:
         """Yield (line, cells) of every row of data."""
         return islice(self.everything(), self.above + 1 + self.units_below, None)
 
+    def laid_out(self, headings: Sequence[Heading], rows: Iterable[tuple[int, list[str]]]) -> Source:
+        """Return the table with other columns, and the rows of data that it then has."""
+        records = [(0, [each.written for each in headings]), *rows]
+        return replace(
+            self,
+            headings=list(headings),
+            records=records,
+            sheet=None,
+            above=0,
+            units_below=False,
+            unnamed_first=False,
+        )
+
     def filled(self, columns: Iterable[int]) -> list[int]:
         """Return those of some columns that have a header, or a cell that is not blank."""
         columns = list(columns)
@@ -112,7 +125,7 @@ class Source:
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
             return cell_error(self.file, index + 1, line, column, value, expected)
-        from dalembert.tables.places import address
+        from dalembert.tables.reach import address
 
         at = f"row {line}"
         if column in self.header:
@@ -136,7 +149,7 @@ class Source:
     def _warn_of_unseen(self, used: set[int], top: int) -> None:
         """Warn of hidden rows, hidden columns and percentages that take part."""
         assert self.sheet is not None
-        from dalembert.tables.places import address, letters
+        from dalembert.tables.reach import address, letters
 
         looks, of = self.sheet.unseen, f"{self.file}: sheet {quote(self.sheet.name)}"
         filled = {line - 1 for line, _ in self.everything()} if looks.rows else set()

@@ -20,8 +20,17 @@ from xml.parsers.expat import ExpatError
 from dalembert.errors import DataError, quote
 from dalembert.tables import old_workbooks
 from dalembert.tables.files import ZIP
-from dalembert.tables.places import MAIN, OFFICE, TABLE, Place, address, part_of, place_of
-from dalembert.tables.reach import check_file, check_sheet
+from dalembert.tables.reach import (
+    MAIN,
+    OFFICE,
+    TABLE,
+    Place,
+    address,
+    check_file,
+    check_sheet,
+    part_of,
+    place_of,
+)
 
 Faults = dict[Place, tuple[str, str]]
 """Cells that have no value of their own: what was found, and what was expected."""

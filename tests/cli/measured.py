@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 from typing import Any
 
 import numpy as np
+
+from tests.cli.printed import document
 
 HEAD = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg"
 
@@ -31,11 +32,6 @@ def runs(*masses: str, on: Any, head: str = HEAD + ",trial_kept", v0: Any = V0) 
     for r, (text, t) in enumerate(zip(masses, on, strict=True)):
         rows += [f"{r + 1},{s},{cell(v)},{text}" for s, v in enumerate(v0 + ALPHA @ np.asarray(t))]
     return table(*rows, head=head)
-
-
-def document(done: subprocess.CompletedProcess[str]) -> Any:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def corrections(done: subprocess.CompletedProcess[str], key: str = "mass_kg") -> Any:

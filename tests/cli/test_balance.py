@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import cmath
-import csv
-import io
 import json
 import math
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.cli.printed import document as answer
+from tests.cli.printed import rows
 from tests.conftest import Dalembert
 
 ROTOR = "name,mass_kg,radius_mm,angle_deg,z_mm\nm1,9,30,60,20\nm2,6,50,210,65\n"
@@ -24,16 +23,6 @@ def rotor(tmp_path: Path) -> Path:
     path = tmp_path / "rotor.csv"
     path.write_text(ROTOR)
     return path
-
-
-def answer(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
-    assert done.returncode == 0, done.stderr
-    document: dict[str, Any] = json.loads(done.stdout)
-    return document
-
-
-def rows(text: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_the_document_has_the_promised_keys(dalembert: Dalembert, rotor: Path) -> None:

@@ -220,6 +220,14 @@ def test_a_tensor_rounded_in_its_last_digit_is_taken(body) -> None:
     assert json.loads(done.stdout)["inertia_kg_m2"][2][2] == pytest.approx(6.67e-6, rel=1e-14)
 
 
+@pytest.mark.whole
+@pytest.mark.parametrize("written", ["0.0", "-0.0", "−0.0", "0e−1"])
+def test_the_coarsest_digit_of_a_tensor_may_stand_in_a_product_of_either_sign(body, written) -> None:
+    table = TENSOR.replace("izz_kg_mm2", "izz_kg_mm2,ixy_kg_mm2").format(f"3.33,3.33,6.690,{written}")
+    done = body(table)
+    assert done.returncode == ("." not in written), done.stderr
+
+
 def test_a_tensor_beyond_its_last_digit_is_refused_as_written(body) -> None:
     done = body(TENSOR.format("3.33,3.33,6.690"))
     assert done.returncode == 1

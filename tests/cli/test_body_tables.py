@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
@@ -11,6 +10,7 @@ import pytest
 
 from rigidbody3d import Body, Shaft
 from rigidbody3d.shaft import shaft_axes
+from tests.cli.printed import document
 
 POLAR = "part,shape,mass_g,radius_mm,angle_deg,z_mm\nW1,point,100,50,30,0\nW2,point,200,40,120,100\n"
 
@@ -22,11 +22,6 @@ def body(dalembert: Any, tmp_path: Any) -> Any:
         return dalembert("body", "parts.csv", *options)
 
     return run
-
-
-def document(done: Any) -> Any:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def test_a_point_by_radius_and_angle(body: Any) -> None:

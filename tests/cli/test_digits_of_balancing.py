@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import subprocess
 import sys
 from fractions import Fraction
@@ -17,14 +15,10 @@ import pytest
 from dalembert.results.columns import Column, Table
 from dalembert.results.digits import digits_that_hold
 from dalembert.results.text import table_text
+from tests.cli.printed import table as rows
 from tests.conftest import Dalembert
 
 HEAD = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg"
-
-
-def rows(done: subprocess.CompletedProcess[str]) -> list[dict[str, str]]:
-    assert done.returncode == 0, done.stderr
-    return list(csv.DictReader(io.StringIO(done.stdout)))
 
 
 def vector(size: str, degrees: str) -> Any:

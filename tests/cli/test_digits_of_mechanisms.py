@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import subprocess
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 
 from benchmarks.truth.four_bar import coupler_point
 from benchmarks.truth.mechanism import Exact
+from tests.cli.printed import table
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
 
@@ -61,11 +61,6 @@ def near(mark: float) -> str:
 
 
 POSES = [pytest.param("40", 11, id="ordinary"), pytest.param(near(1e-7), 5, id="1e-7 from a dead point")]
-
-
-def table(done: subprocess.CompletedProcess[str]) -> list[dict[str, str]]:
-    assert done.returncode == 0, done.stderr
-    return list(csv.DictReader(io.StringIO(done.stdout)))
 
 
 def holds(text: str, true: mp.mpf) -> int:

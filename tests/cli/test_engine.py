@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from balancing.engine import piston_orders, reciprocating_forces, shaft_unbalances, turning_force
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 HEAD = "cylinder,crank_deg,bank_deg,z_mm,throw_mm,rod_mm,reciprocating_g,rotating_g\n"
@@ -27,11 +28,6 @@ INLINE = HEAD + "".join(
 SIX = HEAD + "".join(
     f"{i},{c},90,{100 * i - 250},45,150,500,400\n" for i, c in enumerate((0, 120, 240, 240, 120, 0))
 )
-
-
-def document(done) -> dict:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def engine(dalembert: Dalembert, table: str, *options: str) -> dict:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cli.measured import ALPHA, FAN, HEAD, V0, W, cell, corrections, document, runs, table
+from tests.cli.measured import ALPHA, FAN, HEAD, V0, W, cell, corrections, runs, table
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 

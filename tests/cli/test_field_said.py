@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.measured import FAN, HEAD, cell, document, runs, table
+from tests.cli.measured import FAN, HEAD, cell, runs, table
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 

@@ -7,7 +7,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 
-from tests.cli.measured import document
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 ONE = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,{amplitude},{phase},,,\n1,1,{second},{turned},A,5,0\n"

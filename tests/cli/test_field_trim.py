@@ -14,7 +14,8 @@ import openpyxl
 import pytest
 
 from tests.cli.logs import polar
-from tests.cli.measured import ALPHA, FAN, HEAD, V0, W, cell, document, runs, table
+from tests.cli.measured import ALPHA, FAN, HEAD, V0, W, cell, runs, table
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 BOTH = [[1, 0], [1, 1j]]

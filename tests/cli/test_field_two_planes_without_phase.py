@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.cli.logs import polar
-from tests.cli.measured import document, table
+from tests.cli.measured import table
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 HEAD = "run,sensor,amplitude_um,trial_plane,trial_mass_g,trial_angle_deg"

@@ -8,7 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from tests.cli.measured import FAN, W, document, runs
+from tests.cli.measured import FAN, W, runs
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 BOTH = runs("A,1,0,", "B,1,90,", on=[[1, 0], [0, 1j]])

@@ -10,7 +10,8 @@ import openpyxl
 import pytest
 
 from tests.cli.logs import polar
-from tests.cli.measured import ALPHA, HEAD, V0, W, cell, corrections, document, table
+from tests.cli.measured import ALPHA, HEAD, V0, W, cell, corrections, table
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 ON = [[0, 0], [1, 0], [1, 1j]]

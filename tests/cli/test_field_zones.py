@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from balancing import ZONE_BOUNDARIES, severity_zone
-from tests.cli.measured import FAN, document
+from tests.cli.measured import FAN
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 
 import pytest
+
+from tests.cli.printed import rows
 
 FOUR_BAR = """name = "four-bar"  # as drawn
 [units]
@@ -44,10 +44,6 @@ def target(dalembert, tmp_path):
     options = (*TRUE, "--over", "0:330:30", "--only", "H", "-o", "t.csv")
     assert dalembert("mechanism", "m.toml", *options).returncode == 0
     return tmp_path / "t.csv"
-
-
-def rows(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_the_file_is_written_with_what_was_found(dalembert, target, tmp_path):

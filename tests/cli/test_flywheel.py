@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from balancing import torque_cycle
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 OPTIONS = ("--speed", "10rad_s", "--fluctuation", "0.02")
-
-
-def document(done) -> dict:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def table(angles, torques, header: str = "angle_deg,torque_N_m") -> str:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 from balancing import api_unbalance, journal_loads, mil_unbalance, permissible_unbalance
+from tests.cli.printed import document
 from tests.conftest import Dalembert
 
 RPM = np.pi / 30
@@ -15,11 +14,6 @@ LB, OZ_IN = 0.45359237, 0.45359237 / 16 * 0.0254
 ROTOR = "unbalance_g_mm,angle_deg,z_mm\n500,30,100\n300,200,300\n"
 PLANES = ("--plane", "A:0mm:50mm", "--plane", "B:400mm:50mm")
 FAN = "run,sensor,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,b,3.4,116,,,\n1,b,1.8,42,1,2,0\n"
-
-
-def document(done) -> dict:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def test_a_published_comparison() -> None:

@@ -11,12 +11,8 @@ import numpy as np
 import pytest
 
 from balancing import index_balancing
+from tests.cli.printed import document
 from tests.conftest import Dalembert
-
-
-def document(done) -> dict:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def vector(part: dict, size: str = "unbalance_kg_m", angle: str = "angle_deg") -> complex:

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from dalembert.results.json_text import json_elements, json_members, json_parts
+from dalembert.results.text import json_elements, json_members, json_parts
 
 DOCUMENTS = [
     {},

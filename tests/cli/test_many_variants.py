@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 
 import numpy as np
@@ -52,10 +50,6 @@ def table(tmp_path):
         return name
 
     return write
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_remarks_are_those_of_each_described_alone(dalembert, table):

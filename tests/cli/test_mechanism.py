@@ -6,13 +6,12 @@ import csv
 import io
 import json
 import math
-import subprocess
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.cli.printed import document as answer
 from tests.conftest import Dalembert
 
 EXAMPLES = Path(str(files("cli") / "examples"))
@@ -35,11 +34,6 @@ at = "180 deg"
 coupler = 0.3
 rocker = 2.0
 """
-
-
-def answer(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def test_one_pose_as_json(dalembert: Dalembert) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from pathlib import Path
 
 import pytest
 
+from tests.cli.printed import rows
 from tests.conftest import Dalembert
 from tests.four_bars import body, four_bar
 
@@ -25,10 +24,6 @@ SWEEP = ("--over", "0deg:360deg:10deg")
 @pytest.fixture(autouse=True)
 def _file(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
-
-
-def rows(text: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_output_holds_what_standard_output_shows(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 
 import numpy as np
 import pytest
 
+from tests.cli.printed import rows
 from tests.four_bars import body, four_bar
 
 FILE = four_bar(
@@ -34,10 +33,6 @@ def file(tmp_path):
         return "m.toml"
 
     return write
-
-
-def rows(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_every_number_has_its_spread_and_shares_that_sum_to_one(dalembert, file):

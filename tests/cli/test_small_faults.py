@@ -15,7 +15,8 @@ import pytest
 
 from dalembert.quantities import parse_number, parse_quantity
 from tests.cli.logs import log
-from tests.cli.measured import FAN, HEAD, document, table
+from tests.cli.measured import FAN, HEAD, table
+from tests.cli.printed import document
 from tests.conftest import COMMAND, Dalembert
 
 FULL = Path("/dev/full")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
+
+from tests.cli.printed import document
 
 RACKET = "inertia = [1, 2, 3]\nomega = [0.01, 1, 0.01]\n"
 TOP = "inertia = [1, 1, 0.6]\nomega = [0.5, 1, 3]\nattitude = [0.8, 0.6, 0, 0]\n[top]\nmgl = 1.2\n"
@@ -19,11 +20,6 @@ def spin(dalembert, tmp_path):
         return dalembert("spin", "body.toml", *options)
 
     return run
-
-
-def document(done) -> dict:
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def test_times(spin) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 
 import pytest
 
+from tests.cli.printed import rows
 from tests.four_bars import body, four_bar
 
 
@@ -31,10 +30,6 @@ def files(tmp_path):
         return name
 
     return write
-
-
-def rows(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_set_is_the_file_with_that_number(dalembert, files):

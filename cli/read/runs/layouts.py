@@ -378,17 +378,7 @@ class _Long:
         if self.size is not None:
             names += [f"{self.size.kind}_{self.size.unit}", f"trial_angle_{self._angle_unit()}"]
             names += ["trial_plane"] if self.planes else []
-        headings = [Heading(name, name) for name in names]
-        records = [(0, names), *self._records()]
-        return replace(
-            self.wide,
-            headings=headings,
-            records=records,
-            sheet=None,
-            above=0,
-            units_below=False,
-            unnamed_first=False,
-        )
+        return self.wide.laid_out([Heading(name, name) for name in names], self._records())
 
     def _angle_unit(self) -> str:
         return next((c.unit for (kind, _), c in self.at.items() if kind == "trial_angle"), "deg")

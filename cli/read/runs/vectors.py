@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import NamedTuple
 
@@ -338,16 +338,7 @@ def parted_cells(source: Source) -> Source:
 
     taken = ", ".join(quote(source.headings[k].written) for k in columns)
     source.warnings.append(f"{source.file}: read size and angle (degrees) from the cells of {taken}")
-    records = [(0, [each.written for each in headings]), *rows()]
-    return replace(
-        source,
-        headings=headings,
-        records=records,
-        sheet=None,
-        above=0,
-        units_below=False,
-        unnamed_first=False,
-    )
+    return source.laid_out(headings, rows())
 
 
 def _name_of_angle(each: Heading) -> str:
