@@ -321,7 +321,8 @@ class Variants:
             empty: Document = dict(self.study.blank)
             if self.plan.row is not None and not self.study.one_blank_row:
                 other = Variants(self.study, self.plan, 0, self.plan.row[None]).one(0, True)
-                empty = {key: unassembled(value) for key, value in other.items()}
+                # that variant too may lack what was requested: a loop for --newton
+                empty = {key: unassembled(value) for key, value in (other or empty).items()}
             listed = [empty if document is None else document for document in listed]
         headers = [d.header for d in cases.dimensions]
         return [

@@ -230,3 +230,13 @@ def test_columns_of_points_that_differ_in_case_alone(dalembert, tmp_path):
     assert places("LINKS.ARM.B.X_m", "3") == (
         "dalembert: c.csv: column LINKS.ARM.B.X_m: expected links.arm.B.x or links.arm.b.x, in upper and lower case as here\n"
     )
+
+
+def test_variants_without_a_loop_for_newton_say_so(dalembert, tmp_path):
+    (tmp_path / "arm.toml").write_text(
+        '[ground]\nO = [0, 0]\n[links.arm]\npoints = { O = [0, 0], B = [1, 0] }\n[input]\nlink = "arm"\nangle = 0\n'
+    )
+    found = dalembert("mechanism", "arm.toml", "--newton", "--over", "links.arm.B.x=1m:2m:1m", "--json")
+    assert found.returncode == 1
+    assert [each["set"]["links.arm.B.x_m"] for each in json.loads(found.stdout)["variants"]] == [1, 2]
+    assert "variants 1, 2: newton: the mechanism has no loop to close" in found.stderr
