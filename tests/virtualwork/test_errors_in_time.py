@@ -275,3 +275,27 @@ def test_where_a_first_solution_goes_another_way(
         abs(float(swung(angle, speed, x) - q)) for x, q in zip(t.tolist(), run.angle[:, 0], strict=True)
     ]
     assert (np.array(off_by) <= run.error_estimate[:, 0]).all()
+
+
+@pytest.mark.parametrize("joints", ["A", "B", "ABCD", ""])
+def test_a_jump_of_friction_takes_digits_at_its_own_time_alone(joints: str) -> None:
+    """Where a pin turns back accelerations and joint forces jump; afterwards they have their digits again, at rest too."""
+    m, t = four_bar(friction=[Friction(j, 0.3, 0.02) for j in joints]), np.linspace(0, 6, 13)
+    run, finer = (m.simulate(t, accuracy=accuracy) for accuracy in (1e-8, 1e-12))
+    assert bool(run.fine.jumps) == bool(joints)
+    answers, errors = estimated(run)
+    exact, rest = estimated(finer)
+    for name, answer in answers.items():
+        assert (np.abs(answer - exact[name]) <= errors[name] + rest[name]).all(), name
+        assert errors[name].max() < 1e-4 * np.abs(answer).max(initial=1.0), name
+    if joints == "A":
+        # the friction that holds the crank at last is a torque of its own
+        (pin,) = (j for j in run.first_motion.dynamics.reactions.joints if j.name == "A")
+
+        def moment(way: Any, times: Any, moved: Any) -> list[Any]:
+            return [way.motion(times, moved).dynamics.joint_moment(pin, "crank")]
+
+        (exact_moment,) = moment(finer.fine, t, None)
+        ((answer,), (error,)) = moment(run.fine, t, None), run.errors(moment)
+        assert (np.abs(answer - exact_moment) <= error + 1e-13).all()
+        assert (error < 1e-6 * np.abs(answer)).all()

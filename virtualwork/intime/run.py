@@ -111,14 +111,15 @@ class Run:
     def errors(self, of: Callable[[Travel, Reals, Moved | None], Sequence[Reals]]) -> list[Reals]:
         """The errors of quantities at the times, (n,) each: how far those of states lie that are as wrong as these may be.
 
-        The distance of the two solutions counts too, the largest so far, at the nodes as well: they may meet by chance.
+        The distance of the two solutions counts too, the largest so far, at the nodes as well: they may meet by chance. Not
+        where friction jumps, of which the one knows a moment before the other.
 
         Parameters
         ----------
         of : function of a solution, times (m,), and by how much inputs and speeds are moved, (m, k) each
             Gives the quantities, (m,) each.
         """
-        nodes = self.coarse.nodes[self.coarse.nodes <= self.fine.end]
+        nodes = np.setdiff1d(self.coarse.nodes[self.coarse.nodes <= self.fine.end], self.coarse.jumps)
         some = nodes[np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), NODES)).astype(int))]
         t = np.union1d(some, self.t)
         q, gap, faster = solutions_apart(self.fine, self.coarse, t)

@@ -102,6 +102,11 @@ class Travel:
         """The times between steps."""
         return np.unique(np.concatenate([leg.nodes.t for leg in self.legs]))
 
+    @property
+    def jumps(self) -> Floats:
+        """The times at which a joint with friction comes to rest, turns back or breaks away."""
+        return [leg.end for leg in self.legs if leg.ended.startswith("friction")]
+
     def blur(self, times: Reals) -> Reals:
         """How far the coordinate may be wrong for interpolation near change points, at times between nodes too, (n,)."""
         t, places, place = [self.legs[0].nodes.t[:1]], [np.zeros(1)], 0.0
@@ -222,8 +227,9 @@ class Travel:
         for leg, rows in self._parts(times):
             q, v, a, _ = leg.at(times[rows])
             if moved is not None:
-                # other coordinates may be as wrong as the inputs
-                q, v = q + moved[0][rows], v + moved[1][rows]
+                # other coordinates may be as wrong as the inputs; what friction locks has no speed
+                locked = isinstance(leg.equations, Rubbing) and leg.equations.locked
+                q, v = q + moved[0][rows], v if locked else v + moved[1][rows]
                 a = leg.equations.many(times[rows], q, v)[:, :-1]
             part = leg.coordinates.motion(q, v, a, times[rows])
             if isinstance(leg.equations, Rubbing) and rests(leg.equations, v).any():
