@@ -69,7 +69,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         raise bad("-o", "expected -o FOLDER, where the sheets go")
     for name in options.system or ():
         if name not in SYSTEMS:
-            raise bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}")
+            raise bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}; moodle.xml is always written")
     exercise = read_exercise(options.file)
     if options.page and "--page" not in options_of(exercise.command[0]):
         raise bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")

@@ -160,7 +160,9 @@ class Table:
     @property
     def as_written(self) -> dict[str, list[str]]:
         """Columns of a table of texts alone, by the headers as the file has them: `Group (A)`."""
-        return dict(zip(map(str.strip, self.header), self.texts.values(), strict=True))
+        assert self._source is not None
+        titles = (each.written for each in self._source.headings if each.name)
+        return dict(zip(titles, self.texts.values(), strict=True))
 
     def needed(self, name: str) -> list[str]:
         """Return a column of texts, or say that the table lacks it."""
@@ -212,7 +214,7 @@ def read(
     numbers
         Quantity -> dimension (a key of `dalembert.units.UNITS`) of the columns of numbers the command knows.
     texts
-        The columns of names; a name is text whatever it looks like. None: every column.
+        The columns of names; a name is text whatever it looks like. None: every column that has a header.
     cells
         As `numbers`, for columns whose cells the command reads itself.
     blank
@@ -239,7 +241,7 @@ def read(
             each if name == each.name else Heading(each.written, name)
             for each, name in zip(source.headings, meant, strict=True)
         ]
-    texts = [each.name for each in source.headings] if texts is None else texts
+    texts = [each.name for each in source.headings if each.name] if texts is None else texts
     found = find_columns(source.file, source.headings, dimensions, texts)
     columns = [
         _Column(

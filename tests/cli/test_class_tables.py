@@ -79,6 +79,21 @@ def test_other_columns_of_a_roster_keep_their_names(
         assert next(csv.reader(stream)) == ["student", column, "points", "of"]
 
 
+@pytest.mark.parametrize("empty", [";", ";;", ";;;"])
+def test_columns_that_a_spreadsheet_leaves_empty(dalembert: Dalembert, tmp_path: Path, empty: str) -> None:
+    """Of a roster and of the answers: they have no header, and none is missed."""
+    rotor_exercise(tmp_path)
+    (tmp_path / "class.csv").write_text(f"student;name{empty}\n1;a{empty}\n2;b{empty}\n")
+    done = dalembert("exercise", "e.toml", "--students", "class.csv", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    lines = (tmp_path / "out" / "answers.csv").read_text().splitlines()
+    assert lines[0] == "student,name,plane,quantity,unit,answer"
+    (tmp_path / "a.csv").write_text("".join(f"{line.replace(',', ';')}{empty}\n" for line in lines))
+    done = dalembert("grade", "e.toml", "a.csv", "--key", "out/key.csv")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[0].startswith("student,name,plane,quantity")
+
+
 def test_a_table_that_the_command_cannot_read_is_no_matter_of_the_drawn_values(
     dalembert: Dalembert, german: Path
 ) -> None:
