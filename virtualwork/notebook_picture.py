@@ -96,9 +96,10 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
 
 
 def _marks(shape: Circle | Line, xy: Callable[[complex], tuple[float, float]]) -> Real:
-    """Where a shape is drawn: pixels (k, 2) along its lines, or the middle of its circle."""
+    """Where a shape is drawn: pixels (k, 2) along its lines, or around its circle and in the middle."""
     if isinstance(shape, Circle):
-        return np.array([xy(shape.centre)])
+        around = shape.radius * np.exp(1j * np.linspace(0, 2 * np.pi, 32))
+        return np.array([xy(shape.centre + complex(z)) for z in (0, *around)])
     ends = np.array([xy(z) for z in (*shape.points, *shape.points[: shape.closed])])
     return np.concatenate([ends[:1], *(_along(a, b) for a, b in pairwise(ends))])
 
