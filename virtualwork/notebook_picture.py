@@ -91,7 +91,7 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
         x, y = xy(at(label.body, label.at))
         middle, own = _free(label.text, np.array([x, y]), taken, np.array([width, height]))
         taken = np.concatenate([taken, own])
-        parts.append(_name(label, *middle, _color(order, label.body)))
+        parts.append(_name(label, float(middle[0]), float(middle[1]), _color(order, label.body)))
     return "".join([*parts, "</svg>"])
 
 
