@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Drawing, Label, standing
+from virtualwork.drawing import Circle, Drawing, Label, Line, standing
 from virtualwork.formulas.poses import Poses
 
 WIDTH, HEIGHT, EDGE = 520.0, 360.0, 26.0
@@ -28,6 +31,9 @@ LOOK = {
     "mass": (0.9, 0.0),
     "tip": (1.0, 1.0),
 }
+AROUND = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1], [1, 0], [-1, 0], [0, -1], [0, 1]])
+"""Sides on which a name may stand, y downwards; the first that is free is taken."""
+Real = NDArray[np.float64]
 
 
 def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
@@ -79,10 +85,42 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
             continue
         points = " ".join(f"{x},{y}" for x, y in map(xy, stood.points))
         parts.append(f'<{"polygon" if closed else "polyline"} points="{points}" {look}/>')
-    for label in drawing.labels:
+    taken = np.concatenate([_marks(stood, xy) for _, stood in drawn])
+    # names of links give way to those of points
+    for label in sorted(drawing.labels, key=lambda label: label.of == "link"):
         x, y = xy(at(label.body, label.at))
-        parts.append(_name(label, x, y, _color(order, label.body)))
+        middle, own = _free(label.text, np.array([x, y]), taken, np.array([width, height]))
+        taken = np.concatenate([taken, own])
+        parts.append(_name(label, float(middle[0]), float(middle[1]), _color(order, label.body)))
     return "".join([*parts, "</svg>"])
+
+
+def _marks(shape: Circle | Line, xy: Callable[[complex], tuple[float, float]]) -> Real:
+    """Where a shape is drawn: pixels (k, 2) along its lines, or around its circle and in the middle."""
+    if isinstance(shape, Circle):
+        around = shape.radius * np.exp(1j * np.linspace(0, 2 * np.pi, 32))
+        return np.array([xy(shape.centre + complex(z)) for z in (0, *around)])
+    ends = np.array([xy(z) for z in (*shape.points, *shape.points[: shape.closed])])
+    return np.concatenate([ends[:1], *(_along(a, b) for a, b in pairwise(ends))])
+
+
+def _along(a: Real, b: Real) -> Real:
+    """Pixels (k, 2) some 4 apart from a to b."""
+    return a + np.linspace(0, 1, 2 + int(np.hypot(*(b - a)) / 4))[:, None] * (b - a)
+
+
+def _free(text: str, at: Real, taken: Real, size: Real) -> tuple[Real, Real]:
+    """Return the middle of a name beside its place, where least is drawn, and the pixels (k, 2) that the name takes."""
+    half = np.array([3.3 * len(text), 7.0])
+    # the edge of the name is as far from its place as these
+    middles = np.concatenate([at + AROUND * (half + gap) for gap in (3.0, 9.0, 16.0)])
+    hits = (np.abs(taken - middles[:, None]) < half + 2).all(axis=2).sum(axis=1)
+    beyond = np.maximum(0, np.maximum(half - middles, middles + half - size)).sum(axis=1)
+    middle = middles[np.argmin(hits + beyond)]
+    corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    return np.round(middle, 2), np.concatenate(
+        [_along(middle - (half[0], 0), middle + (half[0], 0)), middle + corners]
+    )
 
 
 def _color(order: list[str], body: str) -> str:
@@ -90,6 +128,5 @@ def _color(order: list[str], body: str) -> str:
 
 
 def _name(label: Label, x: float, y: float, color: str) -> str:
-    if label.of == "point":
-        return f'<text x="{x - 7}" y="{y - 8}" text-anchor="end" fill="{INK}">{escape(label.text)}</text>'
-    return f'<text x="{x + 8}" y="{y + 13}" font-size="11" fill="{color}">{escape(label.text)}</text>'
+    look = f'fill="{INK}"' if label.of == "point" else f'font-size="11" fill="{color}"'
+    return f'<text x="{x}" y="{y}" text-anchor="middle" dominant-baseline="central" {look}>{escape(label.text)}</text>'
