@@ -11,7 +11,7 @@ from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import Heading, plain_word, quantity_meant
 from dalembert.tables.sources import Source
-from dalembert.tables.table import Cells, Table, read
+from dalembert.tables.table import Cells, Table, read, without_dashes
 from dalembert.units import find_unit, parted
 
 NAMES = {
@@ -48,12 +48,13 @@ def runs_layout(path: str) -> Layout:
         of_log = is_log(header)
         return headed(header) if of_log else _trial_names(header)
 
+    masses = {"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"}
     table = read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
         texts=TEXTS,
-        cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight", "amplitude", "phase"],
+        cells=masses,
+        blank=["speed", "weight", "amplitude", "phase", "trial_plane", *masses],
         headers=headers,
         layout=long_form,
     )
@@ -395,7 +396,7 @@ class _Long:
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         for number, (line, cells) in enumerate(self.wide.rows(), 1):
-            cells = [*cells, *[""] * (len(self.wide.headings) - len(cells))]
+            cells = without_dashes([*cells, *[""] * (len(self.wide.headings) - len(cells))])
             rest = [cells[c.place].strip() for c in self.whole]
             if not any(c.kind == "run" for c in self.whole):
                 rest.append(str(number))
