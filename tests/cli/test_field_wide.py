@@ -269,7 +269,7 @@ def test_a_dash_stands_for_an_empty_cell(dalembert: Dalembert, table: str, dash:
 
 def test_a_dash_is_no_number_where_one_is_needed(dalembert: Dalembert) -> None:
     done = dalembert(
-        "balance", "-", "--plane", "A:9mm:0mm", stdin="mass_g,radius_mm,angle_deg,z_mm\n-,1,2,3\n"
+        "balance", "-", "--plane", "A:9mm:5mm", stdin="mass_g,radius_mm,angle_deg,z_mm\n-,1,2,3\n"
     )
     assert done.returncode == 1
     assert "found '-', expected a number" in done.stderr

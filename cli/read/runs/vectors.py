@@ -15,26 +15,13 @@ from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.files import read_bytes, remember, split_sheet
-from dalembert.tables.headers import Heading, plain_word
+from dalembert.tables.headers import Heading, plain_word, words_of
 from dalembert.tables.sources import LINE, Source, decoded, open_source
 from dalembert.tables.table import Cells, Numbers, Table, without_dashes
 from dalembert.units import find_unit, parted
 
-AMPLITUDE = (
-    "amplitude",
-    "amp",
-    "schwinggeschwindigkeit",
-    "schwingweg",
-    "schwingung",
-    "schwingungen",
-    "schwingbeschleunigung",
-    "vibration",
-    "displacement",
-    "velocity",
-    "acceleration",
-)
-MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
-UNBALANCE = ("unbalance", "unwucht")
+AMPLITUDE, UNBALANCE = words_of("amplitude"), words_of("unbalance")
+MASS = words_of("mass", "weight", "trial_mass")
 KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
 
 
