@@ -51,7 +51,9 @@ def _parts(number: str) -> tuple[int, int]:
 
 def _quotient(whole: int, places: int, above: int, below: int) -> float:
     """Whole numbers are divided with one rounding, however long they are."""
-    return whole * above * 10 ** max(-places, 0) / (below * 10 ** max(places, 0))
+    up: int = 10 ** max(-places, 0)
+    down: int = 10 ** max(places, 0)
+    return whole * above * up / (below * down)
 
 
 def times(value: Scaled, above: float, below: float) -> Scaled:
@@ -74,7 +76,7 @@ def times(value: Scaled, above: float, below: float) -> Scaled:
     if above == below or not (isinstance(above, int) and isinstance(below, int)):
         return plain
     if isinstance(value, (int, float)):
-        return _one(float(value), plain, above, below)
+        return _one(float(value), above, below)
     if isinstance(value, complex):
         return complex(times(value.real, above, below), times(value.imag, above, below))
     import numpy as np
@@ -86,14 +88,14 @@ def times(value: Scaled, above: float, below: float) -> Scaled:
     return _many(value, plain, above, below)  # type: ignore[arg-type, return-value]
 
 
-def _one(value: float, plain: float, above: int, below: int) -> float:
+def _one(value: float, above: int, below: int) -> float:
     if not value or not abs(value) < 10.0**FIGURES:
-        return plain
+        return value * above / below
     if value.is_integer():
         return int(value) * above / below
     whole, places = _parts(float.__repr__(value))
     if places > PLACES or abs(whole) >= 10**FIGURES:
-        return plain
+        return value * above / below
     return _quotient(whole, places, above, below)
 
 

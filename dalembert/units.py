@@ -13,7 +13,9 @@ from collections.abc import Container
 from functools import cache
 from typing import NamedTuple
 
-from dalembert.decimals import Factor, Scaled, times
+from dalembert.decimals import Factor as Factor
+from dalembert.decimals import Scaled as Scaled
+from dalembert.decimals import times
 
 # exponents of length, mass, time, angle
 Exponents = tuple[int, int, int, int]

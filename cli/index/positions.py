@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing import index_balancing
 from balancing.indexing import Indexed
+from cli.read.runs.vectors import parted_cells
 from dalembert.angles import degrees, phasor
 from dalembert.errors import DataError, quote
 from dalembert.results.columns import Column, Table, apart, names, number
@@ -81,7 +82,7 @@ def read_positions(path: str, phase_lag: bool) -> Positions:
         "amplitude": "amplitude",
         "phase": "angle",
     }
-    table = read(path, numbers=dimensions, texts=["rotor", "plane", "sensor"])
+    table = read(path, numbers=dimensions, texts=["rotor", "plane", "sensor"], layout=parted_cells)
     turned = table.require("turned", "angle")
     if "unbalance" in table.numbers and "amplitude" in table.numbers:
         both = " and ".join(table.numbers[name].header for name in ("unbalance", "amplitude"))

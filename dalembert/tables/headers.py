@@ -258,7 +258,8 @@ _WORDS = {
     "run": "run lauf messlauf messung corrida rodada medicao marcha medicion ensayo essai mesure lancement",
     "sensor": "sensor bearing lager lagerstelle aufnehmer messstelle messpunkt messebene transdutor captador sonda capteur point_de_mesure",
     "speed": "speed drehzahl velocidade rotacao velocidad velocidad_de_giro vitesse vitesse_de_rotation n rpm",
-    "amplitude": "amplitude schwingung vibration vibracao vibracion amplitud valor wert",
+    "amplitude": "amplitude amp schwingung schwingungen schwingweg schwinggeschwindigkeit schwingbeschleunigung vibration vibracao "
+    "vibracion amplitud displacement velocity acceleration valor wert",
     "phase": "phase phasenlage phasenwinkel fase fase_angular angle_de_phase",
     "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht massa_de_teste massa_de_prova "
     "massa_tentativa masa_de_prueba peso_de_prueba masse_d_essai masse_test",
@@ -277,6 +278,15 @@ _WORDS = {
     "time": "time zeit tempo tiempo temps t",
 }
 """Quantity -> its names, without accents; among several quantities the first that a command knows is meant."""
+
+
+def words_of(*quantities: str) -> frozenset[str]:
+    """Return the words that mean one of these quantities.
+
+    >>> "testmasse" in words_of("mass", "trial_mass")
+    True
+    """
+    return frozenset(word for quantity in quantities for word in _WORDS[quantity].split())
 
 
 def plain_word(word: str) -> str:

@@ -21,7 +21,7 @@ from dalembert.errors import DataError, quote
 from dalembert.quantities import is_number, number_expected, parse_number
 from dalembert.tables.headers import Heading, find_columns, offers, spellings
 from dalembert.tables.sources import Source, open_source
-from dalembert.units import LARGEST, UNITS, to_si
+from dalembert.units import LARGEST, MINUS, UNITS, to_si
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -218,7 +218,7 @@ def read(
     cells
         As `numbers`, for columns whose cells the command reads itself.
     blank
-        The quantities of `numbers` whose cells may be empty: they read as NaN.
+        The columns whose cells may be empty, or a dash in their place: numbers read as NaN, others as no text.
     marker
         Cells of `numbers` that begin with it are no numbers: NaN, and their text in `Table.marks`.
     headers
@@ -300,7 +300,17 @@ class _Column(NamedTuple):
     may_be_blank: bool
 
 
+_DASHES = ("-", "\N{EN DASH}", "\N{EM DASH}", MINUS)
 WITH_COMMA = "a number with a decimal comma, as elsewhere in the file"
+
+
+def without_dashes(cells: Iterable[str]) -> list[str]:
+    """Return cells as they are, but those blank in which a dash alone stands.
+
+    >>> without_dashes(["-", "-3", "a"])
+    ['', '-3', 'a']
+    """
+    return ["" if cell.strip() in _DASHES else cell for cell in cells]
 
 
 def _pointed(text: str) -> str:
@@ -339,6 +349,8 @@ def _read_small(source: Source, table: Table, columns: Sequence[_Column], marker
     decimal_comma = source.has_commas(written[each.place] for each in columns if each.kind != "text")
     for each in columns:
         cells = [cell.strip() for cell in written[each.place]]
+        if each.may_be_blank:
+            cells = without_dashes(cells)
         if each.kind == "text":
             table.texts[each.name] = cells
         elif each.kind == "cell":
@@ -370,10 +382,12 @@ def _read_large(source: Source, table: Table, columns: Sequence[_Column], marker
     for each in columns:
         column = frame[each.place]
         if each.kind == "text":
-            table.texts[each.name], table._numbered[each.name] = _texts(column)
+            table.texts[each.name], table._numbered[each.name] = _texts(column, each.may_be_blank)
             continue
         if each.kind == "cell":
             cells = [cell.strip() for cell in column.tolist()]
+            if each.may_be_blank:
+                cells = without_dashes(cells)
             if source.has_commas([cells]) and decimal == ".":
                 return False
             table.cells[each.name] = Cells(each.header, each.unit, cells, decimal == ",")
@@ -418,16 +432,18 @@ def _frame(source: Source, columns: Sequence[_Column], marker: str, decimal: str
         dtype={each.place: kind(each) for each in columns},
         usecols=[each.place for each in columns] or None,
         keep_default_na=False,
-        na_values={place: [""] for place in blanks},
+        na_values={place: ["", *_DASHES] for place in blanks},
         decimal=decimal,
         engine="c",
         **exact,
     )
 
 
-def _texts(column: pd.Series) -> tuple[list[str], tuple[list[str], NDArray[np.intp]]]:
+def _texts(column: pd.Series, may_be_blank: bool) -> tuple[list[str], tuple[list[str], NDArray[np.intp]]]:
     """Return a column's texts, and as `Table.numbered` has them; two that differ in blanks are one."""
     stripped = [str(category).strip() for category in column.cat.categories]
+    if may_be_blank:
+        stripped = without_dashes(stripped)
     codes = column.cat.codes.to_numpy().astype(np.intp)
     first = np.zeros(len(stripped), dtype=np.intp)
     first[codes[::-1]] = np.arange(len(codes))[::-1]

@@ -250,6 +250,32 @@ def test_a_cell_may_hold_amplitude_and_phase(dalembert: Dalembert, mark: str, de
         assert any("read size and angle (degrees) from the cells of" in line for line in result["warnings"])
 
 
+@pytest.mark.parametrize("dash", ["-", "\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}", " - "])
+@pytest.mark.parametrize(
+    "table",
+    [
+        "run,sensor,speed_rpm,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
+        "0,1,1500,4,90,DASH,DASH,DASH\n0,2,1500,1,0,DASH,DASH,DASH\n1,1,1500,2,90,P,5,0\n1,2,1500,1,0,P,5,0\n",
+        "run,sensor,amplitude_mm_s,trial_plane,trial_mass_g\n0,1,4@90,DASH,DASH\n1,1,2@90,P,5@0\n1,2,DASH,P,5@0\n0,2,3@1,,\n",
+        "Lauf;A [mm/s];Phase A;B [mm/s];Phase B;m A [g];Winkel A;m B [g];Winkel B\n"
+        "0;4,5;90;4;DASH;DASH;DASH;DASH;DASH\n1;2;90;2;3;5;0;DASH;DASH\n2;2;90;2;3;DASH;DASH;5;0\n",
+    ],
+    ids=["long", "cells of two", "wide"],
+)
+def test_a_dash_stands_for_an_empty_cell(dalembert: Dalembert, table: str, dash: str) -> None:
+    dashed, blank = (dalembert("field", "-", "--json", stdin=table.replace("DASH", x)) for x in (dash, ""))
+    assert (dashed.returncode, dashed.stdout) == (blank.returncode, blank.stdout)
+    assert "found '-'" not in dashed.stderr
+
+
+def test_a_dash_is_no_number_where_one_is_needed(dalembert: Dalembert) -> None:
+    done = dalembert(
+        "balance", "-", "--plane", "A:9mm:5mm", stdin="mass_g,radius_mm,angle_deg,z_mm\n-,1,2,3\n"
+    )
+    assert done.returncode == 1
+    assert "found '-', expected a number" in done.stderr
+
+
 def test_several_masses_in_a_cell(dalembert: Dalembert) -> None:
     """4 mm/s at 90° that 10 g at 0° would correct, with 5 g at 0° in A, and with this and 3 g at 90° in B."""
     head = "run,sensor,amplitude_mm_s,trial_plane,trial_mass_g\n"

@@ -29,6 +29,20 @@ def test_two_positions_by_hand(dalembert: Dalembert) -> None:
     assert found["rotor"]["uncertainty_kg_m"] is None
 
 
+@pytest.mark.parametrize(
+    ("header", "rows"),
+    [
+        ("turned_deg,unbalance_g_mm", "0,5@0\n180,3@90\n"),
+        ("turned_deg,unbalance_g_mm", "0,5 / 0°\n180,3∠90\n"),
+        ("turned_deg,amplitude_um", "0,5@0\n180,3@90\n"),
+    ],
+)
+def test_cells_of_size_and_angle_are_those_of_field(dalembert: Dalembert, header: str, rows: str) -> None:
+    result = document(dalembert("index", "-", "--json", stdin=f"{header}\n{rows}"))
+    of = ("unbalance_kg_m", "angle_deg", 1e6) if "unbalance" in header else ("amplitude", "phase_deg", 1.0)
+    assert vector(result["rotor"], *of[:2]) * of[2] == pytest.approx(2.5 - 1.5j, rel=1e-15)
+
+
 def test_three_positions_of_amplitudes_and_the_sense_of_the_phase(dalembert: Dalembert) -> None:
     # rotor 2 µm at 30°, mandrel 1 µm at 200°, at 0, 120 and 240°
     rotor, mandrel = 2 * np.exp(1j * np.radians(30)), np.exp(1j * np.radians(200))

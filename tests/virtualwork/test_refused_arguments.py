@@ -146,3 +146,30 @@ def test_tables_that_do_not_rise(rows):
         DescriptionError, match="force on arm history: expected at least two rows, the input rising"
     ):
         Force("arm", history=rows)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "inputs", "words"),
+    [
+        (
+            [],
+            [0.0],
+            r"numbers must have the shape \(1,\), one for each of links.arm.P.x, found the shape \(0,\)",
+        ),
+        ([2.0, 3.0], [0.0], r"numbers must have the shape \(1,\).*found the shape \(2,\)"),
+        (2.0, [0.0], r"numbers must have the shape \(1,\).*found the shape \(\)"),
+        ([[2.0]], [0.0], r"numbers must have the shape \(1,\).*found the shape \(1, 1\)"),
+        ([2.0], 0.0, r"inputs must have the shape \(n,\), found the shape \(\)"),
+        (["x"], [0.0], "numbers must be an array of numbers, found"),
+    ],
+)
+def test_a_design_of_other_dimensions(numbers, inputs, words):
+    design = Mechanism({"O": 0j}, ARM, inputs=Input("arm")).design(["links.arm.P.x"], "points.P")
+    for ask in (design, design.slopes):
+        with pytest.raises(ValueError, match=words):
+            ask(numbers, inputs)
+
+
+def test_a_design_at_no_inputs():
+    design = Mechanism({"O": 0j}, ARM, inputs=Input("arm")).design(["links.arm.P.x"], "points.P")
+    assert (design([2.0], []).shape, design.slopes([2.0], []).shape) == ((2, 0), (2, 0, 2))

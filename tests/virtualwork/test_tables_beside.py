@@ -108,6 +108,18 @@ def test_a_law_in_a_workbook_is_that_of_the_sheet_that_its_name_ends_in(tmp_path
         Mechanism.from_toml_text(CRANK.replace("law.csv", "law.xlsx#third"), folder=tmp_path)
 
 
+@pytest.mark.parametrize(
+    "header", ["t_s,speed_rpm,torque_N_m", "torque_N_m,angle_deg,speed_rad_s", "time_s,t_s,torque_N_m"]
+)
+def test_a_torque_over_two_quantities_is_refused(header: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{header}\n0,0,1\n1,2,3\n")
+    keys = '[[torques]]\nlink = "crank"\ntorque = "t.csv"'
+    with pytest.raises(DescriptionError, match="expected one of them: a table is over one quantity") as error:
+        Mechanism.from_toml_text(CRANK.replace('law = "law.csv"', keys), folder=tmp_path)
+    one, other = (column for column in header.split(",") if "torque" not in column)
+    assert all(column in str(error.value) for column in (one, other))
+
+
 def test_a_torque_over_what_it_cannot_be_over_is_refused() -> None:
     with pytest.raises(DescriptionError, match="found 'input', expected time, angle or speed"):
         Torque("crank", history=((0.0, 1.0), (1.0, 2.0)), over="input")  # type: ignore[arg-type]

@@ -143,7 +143,13 @@ def curve(
         file, sheet = split_sheet(str(name))
         source = source_of(file, data, known, (), sheet)
         columns = find_columns(source.file, source.headings, known, ())
-        axis = next((quantity for quantity in over if quantity in columns), None)
+        axes = [quantity for quantity in over if quantity in columns]
+        if len(axes) > 1:
+            both = " and ".join(source.header[columns[quantity][0]] for quantity in axes)
+            raise DataError(
+                f"{name}: found the columns {both}, expected one of them: a table is over one quantity"
+            )
+        axis = next(iter(axes), None)
         if axis is None or columns.keys().isdisjoint(values):
             expected = ", and ".join(_headers(quantities) for quantities in (over, values))
             raise DataError(f"{name}: found the columns {', '.join(source.header)}, expected {expected}")

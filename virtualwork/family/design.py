@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import Repeated, run
+from dalembert.arithmetic.shapes import as_numbers
 from dalembert.hints import choices
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
@@ -125,8 +126,13 @@ class Design:
         -------
         array (rows, n)
             m; rad within (−π, π]. NaN where a pose cannot be assembled.
+
+        Raises
+        ------
+        ValueError
+            No numbers, or another count of them.
         """
-        x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
+        x, q = self._arrays(numbers, inputs)
         if self._written is not None:
             rows, fine = self._evaluated(x, q, None)
             if fine or self._goes(x, q):
@@ -137,12 +143,23 @@ class Design:
         self.evaluations += 1
         return self._alone.values(x, q)
 
+    def _arrays(self, numbers: ArrayLike, inputs: ArrayLike) -> tuple[Reals, Reals]:
+        x, q = as_numbers("numbers", numbers), as_numbers("inputs", inputs)
+        if x.shape != (len(self.dimensions),):
+            paths = ", ".join(self._paths)
+            raise ValueError(
+                f"numbers must have the shape ({len(self.dimensions)},), one for each of {paths}, found the shape {x.shape}"
+            )
+        if q.ndim != 1:
+            raise ValueError(f"inputs must have the shape (n,), found the shape {q.shape}")
+        return x, q
+
     def slopes(self, numbers: ArrayLike, inputs: ArrayLike, inputs_alone: bool = False) -> Reals:
         """Return the derivatives with respect to the dimensions, and last to the inputs themselves, (rows, n, d + 1).
 
         `inputs_alone`: to nothing but the inputs, (rows, n, 1).
         """
-        x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
+        x, q = self._arrays(numbers, inputs)
         enters = ("q0",) if inputs_alone else (*self._paths, "q0")
         if self._written is not None and self._chosen != (x.tobytes(), None):
             slopes, fine = self._evaluated(x, q, enters)
@@ -199,7 +216,7 @@ class Design:
     def _ends(self, q: Reals) -> tuple[float, float]:
         """The least and the largest of the guess's input and these."""
         at = self.mechanism.at[0]
-        return min(float(np.nanmin(q)), at), max(float(np.nanmax(q)), at)
+        return float(np.nanmin(q, initial=at)), float(np.nanmax(q, initial=at))
 
     def _with_way(self, q: Reals) -> Reals:
         """Inputs, and behind them samples of the way from the guess over all of them, of a turn at most."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from cli.read.runs.vectors import AMPLITUDE, MASS, UNBALANCE, Layout, parted_cells, vectors_of
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
-from dalembert.tables.headers import Heading, plain_word, quantity_meant
+from dalembert.tables.headers import Heading, plain_word, quantity_meant, words_of
 from dalembert.tables.sources import Source
-from dalembert.tables.table import Cells, Table, read
+from dalembert.tables.table import Cells, Table, read, without_dashes
 from dalembert.units import find_unit, parted
 
 NAMES = {
@@ -48,12 +48,13 @@ def runs_layout(path: str) -> Layout:
         of_log = is_log(header)
         return headed(header) if of_log else _trial_names(header)
 
+    masses = {"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"}
     table = read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
         texts=TEXTS,
-        cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight", "amplitude", "phase"],
+        cells=masses,
+        blank=["speed", "weight", "amplitude", "phase", "trial_plane", *masses],
         headers=headers,
         layout=long_form,
     )
@@ -131,9 +132,7 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
 
 # -- sheets with a row a run and a column pair for each sensor, in English or German -----------------------------
 
-PHASE = ("phase", "phasenwinkel", "phasenlage")
-TRIAL_ANGLE = ("testwinkel", "probewinkel")
-ANGLE = ("angle", "winkel", "winkellage", *TRIAL_ANGLE)
+PHASE, TRIAL_ANGLE, ANGLE = words_of("phase"), words_of("trial_angle"), words_of("angle", "trial_angle")
 PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
 PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
 KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
@@ -229,7 +228,7 @@ def _translated(source: Source) -> Source:
     whole = any(_is_foreign_sensor(each) for each in source.headings)
     foreign = [_stem(each) for each in source.headings if _stem(each) not in OWN]
     if not whole and not any(
-        quantity_meant(stem, MEANT) or {*stem.split("_")} & {*AMPLITUDE} for stem in foreign
+        quantity_meant(stem, MEANT) or AMPLITUDE.intersection(stem.split("_")) for stem in foreign
     ):
         return source
     for place, each in enumerate(source.headings):
@@ -302,11 +301,11 @@ def _known(place: int, each: Heading, before: str) -> _Column | None:
         word for word, plain in zip(stem.split("_"), words, strict=True) if plain not in (*PLACE, *PLANE)
     ]
 
-    def name(*kinds: Sequence[str]) -> str:
+    def name(*kinds: Collection[str]) -> str:
         drop = [word for kind in kinds for word in kind]
         return "_".join(word for word in named if plain_word(word) not in drop)
 
-    def has(*kinds: Sequence[str]) -> bool:
+    def has(*kinds: Collection[str]) -> bool:
         return any(word in kind for word in words for kind in kinds)
 
     angle, amplitude = find_unit("angle", unit), find_unit("amplitude", unit)
@@ -385,7 +384,7 @@ class _Long:
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         for number, (line, cells) in enumerate(self.wide.rows(), 1):
-            cells = [*cells, *[""] * (len(self.wide.headings) - len(cells))]
+            cells = without_dashes([*cells, *[""] * (len(self.wide.headings) - len(cells))])
             rest = [cells[c.place].strip() for c in self.whole]
             if not any(c.kind == "run" for c in self.whole):
                 rest.append(str(number))

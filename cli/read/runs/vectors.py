@@ -15,26 +15,13 @@ from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.files import read_bytes, remember, split_sheet
-from dalembert.tables.headers import Heading, plain_word
+from dalembert.tables.headers import Heading, plain_word, words_of
 from dalembert.tables.sources import LINE, Source, decoded, open_source
-from dalembert.tables.table import Cells, Numbers, Table
+from dalembert.tables.table import Cells, Numbers, Table, without_dashes
 from dalembert.units import find_unit, parted
 
-AMPLITUDE = (
-    "amplitude",
-    "amp",
-    "schwinggeschwindigkeit",
-    "schwingweg",
-    "schwingung",
-    "schwingungen",
-    "schwingbeschleunigung",
-    "vibration",
-    "displacement",
-    "velocity",
-    "acceleration",
-)
-MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
-UNBALANCE = ("unbalance", "unwucht")
+AMPLITUDE, UNBALANCE = words_of("amplitude"), words_of("unbalance")
+MASS = words_of("mass", "weight", "trial_mass")
 KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
 
 
@@ -358,7 +345,7 @@ def _name_of_angle(each: Heading) -> str:
 
 def _sizes_and_angles(source: Source, row: int, column: int, cell: str) -> tuple[str, str]:
     """Return the sizes and the angles of a cell, several joined by ';'."""
-    parts = [part.strip() for part in cell.split(";")]
+    parts = without_dashes(part.strip() for part in cell.split(";"))
     matches = [POLAR.fullmatch(part) for part in parts]
     if not any(parts) or parts == ["0"]:
         return cell, ""
