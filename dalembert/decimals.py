@@ -88,6 +88,31 @@ def times(value: Scaled, above: float, below: float) -> Scaled:
     return _many(value, plain, above, below)  # type: ignore[arg-type, return-value]
 
 
+def shown(value: Scaled, above: float, below: float) -> Scaled:
+    """Numbers in SI in the unit whose factor is above/below; where a decimal of 8 figures is converted to the number, that one.
+
+    Examples
+    --------
+    One pound-force is no short decimal in SI.
+
+    >>> lbf = (8896443230521, 2 * 10**12)
+    >>> times(times(2.3, *lbf), *reversed(lbf)), shown(times(2.3, *lbf), *lbf)
+    (2.3000000000000003, 2.3)
+    """
+    result = times(value, below, above)
+    if not (isinstance(above, int) and isinstance(below, int)) or 10**PLACES % (above * below) == 0:
+        return result
+    import numpy as np
+
+    parts, stored = (np.ascontiguousarray(np.atleast_1d(x)).view(float) for x in (result, value * 1.0))
+    with np.errstate(all="ignore"):
+        power = 10.0 ** (7.0 - np.floor(np.log10(np.abs(parts))))
+        short = np.rint(parts * power) / power
+        same = times(short, above, below) == stored
+    shortest = np.where(same, short, parts).view(np.asarray(result).dtype).reshape(np.shape(result))
+    return shortest if shortest.ndim else shortest.item()  # type: ignore[return-value]
+
+
 def _one(value: float, above: int, below: int) -> float:
     if not value or not abs(value) < 10.0**FIGURES:
         return value * above / below

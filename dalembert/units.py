@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from dalembert.decimals import Factor as Factor
 from dalembert.decimals import Scaled as Scaled
-from dalembert.decimals import times
+from dalembert.decimals import shown, times
 
 # exponents of length, mass, time, angle
 Exponents = tuple[int, int, int, int]
@@ -448,6 +448,5 @@ def to_si(value: Scaled, dimension: str, unit: str) -> Scaled:
 
 
 def from_si(value: Scaled, dimension: str, unit: str) -> Scaled:
-    """Convert a number or an array from SI to `unit`."""
-    numerator, denominator = UNITS[dimension][unit]
-    return times(value, denominator, numerator)
+    """Convert a number or an array from SI to `unit`; what was a decimal of few figures there comes back as that."""
+    return shown(value, *UNITS[dimension][unit])

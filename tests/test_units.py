@@ -190,11 +190,22 @@ def test_a_decimal_is_converted_with_one_rounding_alone_and_in_a_column(
     assert [decimal_to_si(repr(x), ratio) for x in values] == right
 
 
-@pytest.mark.parametrize("unit", ["g", "mg", "t"])
-@pytest.mark.parametrize("figures", [1, 3, 6, 12])
-def test_a_decimal_comes_back_as_it_was_written(unit: str, figures: int) -> None:
+@pytest.mark.parametrize(
+    ("dimension", "unit", "figures"),
+    [("mass", unit, figures) for unit in ("g", "mg", "t") for figures in (1, 3, 6, 12)]
+    + [
+        (*of, figures)
+        for of in (("force", "lbf"), ("mass", "oz"), ("unbalance", "oz_in"), ("length", "in"))
+        for figures in (1, 3, 8)
+    ],
+)
+def test_a_decimal_comes_back_as_it_was_written(dimension: str, unit: str, figures: int) -> None:
     values = np.array([float(x) for x in decimals_of(figures, seed=7) if abs(x) < 10**9])
-    assert from_si(to_si(values, "mass", unit), "mass", unit).tolist() == values.tolist()
+    stored = to_si(values, dimension, unit)
+    assert from_si(stored, dimension, unit).tolist() == values.tolist()
+    assert [from_si(x, dimension, unit) for x in stored.tolist()] == values.tolist()
+    turned = from_si((stored * (1 + 1j))[::-1], dimension, unit)
+    assert turned.real.tolist() == turned.imag.tolist() == values[::-1].tolist()
 
 
 def test_numbers_of_computations_and_no_numbers_keep_their_floats() -> None:
