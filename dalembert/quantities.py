@@ -6,14 +6,13 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
-from dalembert.decimals import decimal_to_si
+from dalembert.decimals import Factor, decimal_to_si
 from dalembert.units import (
     DIMENSIONS,
     LARGEST,
     LISTED,
     MINUS,
     UNITS,
-    Factor,
     composed,
     find_unit,
     nearest_unit,

@@ -13,9 +13,7 @@ from collections.abc import Container
 from functools import cache
 from typing import NamedTuple
 
-from dalembert.decimals import Factor as Factor
-from dalembert.decimals import Scaled as Scaled
-from dalembert.decimals import shown, times
+from dalembert.decimals import Factor, Scaled, shown, times
 
 # exponents of length, mass, time, angle
 Exponents = tuple[int, int, int, int]

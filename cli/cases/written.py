@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dalembert.decimals import decimal_to_si, times
+from dalembert.decimals import Factor, decimal_to_si, times
 from dalembert.quantities import exactly, exactly_in_degrees
-from dalembert.units import UNITS, Factor
+from dalembert.units import UNITS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

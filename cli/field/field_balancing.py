@@ -34,8 +34,9 @@ from cli.read.stored import Stored
 from dalembert.angles import degrees, in_turn, phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts
+from dalembert.decimals import Scaled
 from dalembert.errors import DataError
-from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si, written
+from dalembert.units import UNITS, amplitude_kind, from_si, to_si, written
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -14,12 +14,13 @@ from balancing import index_balancing
 from balancing.indexing import Indexed
 from cli.read.runs.vectors import parted_cells
 from dalembert.angles import degrees, phasor
+from dalembert.decimals import Scaled
 from dalembert.errors import DataError, quote
 from dalembert.results.columns import Column, Table, apart, names, number
 from dalembert.results.way import Topic, figures, vector_text
 from dalembert.tables.table import Table as ReadTable
 from dalembert.tables.table import read
-from dalembert.units import Scaled, from_si, to_si, written
+from dalembert.units import from_si, to_si, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from cli.read.options import bad
 from dalembert.dataclass import dataclass, field, replace
+from dalembert.decimals import Scaled
 from dalembert.hints import nearest
 from dalembert.results.columns import Table, document
-from dalembert.units import UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
+from dalembert.units import UNITS, dimensions, find_unit, from_si, to_si, unit_name
 
 if TYPE_CHECKING:
     from pathlib import Path

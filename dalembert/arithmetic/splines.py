@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dalembert.units import Factor
+    from dalembert.decimals import Factor
 
     Decimals = list[Decimal]
 

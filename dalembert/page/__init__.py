@@ -25,7 +25,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dalembert.units import ABBREVIATIONS, AMPLITUDES, JOINED, LARGEST, PER_MINUTE, SIGNS, TAGS, WORDS, Factor
+from dalembert.decimals import Factor
+from dalembert.units import ABBREVIATIONS, AMPLITUDES, JOINED, LARGEST, PER_MINUTE, SIGNS, TAGS, WORDS
 
 Json = Any
 

@@ -25,6 +25,7 @@ MOST_COLUMNS = 16_384
 
 LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 _CONTROLS = bytes([*range(9), *range(14, 32), 127])
+DASHES = ("-", "\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _QUOTED = re.compile(r'"[^"]*"')
 # rows from which importing pandas pays
 LARGE = 10_000
@@ -340,3 +341,12 @@ def _is_one_column(lines: Sequence[str]) -> bool:
     commas = [line for line in above if "," in line]
     only_units = all(heading(line).unit for line in commas) and not any("," in line for line in numbers)
     return bool(above and numbers) and all(map(_is_number, numbers)) and (not commas or only_units)
+
+
+def without_dashes(cells: Iterable[str]) -> list[str]:
+    """Return cells as they are, but those blank in which a dash alone stands.
+
+    >>> without_dashes(["-", "-3", "a"])
+    ['', '-3', 'a']
+    """
+    return ["" if cell.strip() in DASHES else cell for cell in cells]

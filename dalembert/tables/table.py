@@ -20,8 +20,8 @@ from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.quantities import is_number, number_expected, parse_number
 from dalembert.tables.headers import Heading, find_columns, offers, spellings
-from dalembert.tables.sources import Source, open_source
-from dalembert.units import LARGEST, MINUS, UNITS, to_si
+from dalembert.tables.sources import DASHES, Source, open_source, without_dashes
+from dalembert.units import LARGEST, UNITS, to_si
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -300,17 +300,7 @@ class _Column(NamedTuple):
     may_be_blank: bool
 
 
-_DASHES = ("-", "\N{EN DASH}", "\N{EM DASH}", MINUS)
 WITH_COMMA = "a number with a decimal comma, as elsewhere in the file"
-
-
-def without_dashes(cells: Iterable[str]) -> list[str]:
-    """Return cells as they are, but those blank in which a dash alone stands.
-
-    >>> without_dashes(["-", "-3", "a"])
-    ['', '-3', 'a']
-    """
-    return ["" if cell.strip() in _DASHES else cell for cell in cells]
 
 
 def _pointed(text: str) -> str:
@@ -432,7 +422,7 @@ def _frame(source: Source, columns: Sequence[_Column], marker: str, decimal: str
         dtype={each.place: kind(each) for each in columns},
         usecols=[each.place for each in columns] or None,
         keep_default_na=False,
-        na_values={place: ["", *_DASHES] for place in blanks},
+        na_values={place: ["", *DASHES] for place in blanks},
         decimal=decimal,
         engine="c",
         **exact,

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from dalembert.decimals import times
+from dalembert.decimals import Factor, times
 from dalembert.errors import toml_text
 from dalembert.quantities import decimals, exactly, expected, number_in_si
-from dalembert.units import DIMENSIONS, LARGEST, Factor, composed
+from dalembert.units import DIMENSIONS, LARGEST, composed
 from virtualwork.describe import DescriptionError
 
 LONGEST = 60

@@ -10,8 +10,8 @@ from cli.read.runs.vectors import AMPLITUDE, MASS, UNBALANCE, Layout, parted_cel
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import Heading, plain_word, quantity_meant, words_of
-from dalembert.tables.sources import Source
-from dalembert.tables.table import Cells, Table, read, without_dashes
+from dalembert.tables.sources import Source, without_dashes
+from dalembert.tables.table import Cells, Table, read
 from dalembert.units import find_unit, parted
 
 NAMES = {

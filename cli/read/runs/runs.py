@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import balancing
+from dalembert.decimals import Scaled
 from dalembert.errors import DataError
 from dalembert.tables.table import Table, numbered
-from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
+from dalembert.units import UNITS, amplitude_kind, from_si, to_si
 
 if TYPE_CHECKING:
     from balancing.log_again import ExactFit, ExactPrior

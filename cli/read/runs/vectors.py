@@ -16,8 +16,8 @@ from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.files import read_bytes, remember, split_sheet
 from dalembert.tables.headers import Heading, plain_word, words_of
-from dalembert.tables.sources import LINE, Source, decoded, open_source
-from dalembert.tables.table import Cells, Numbers, Table, without_dashes
+from dalembert.tables.sources import LINE, Source, decoded, open_source, without_dashes
+from dalembert.tables.table import Cells, Numbers, Table
 from dalembert.units import find_unit, parted
 
 AMPLITUDE, UNBALANCE = words_of("amplitude"), words_of("unbalance")
