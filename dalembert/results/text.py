@@ -90,13 +90,21 @@ def as_list(table: Table) -> Table:
     quantity          unit
     static unbalance  g·mm
     <BLANKLINE>
+    >>> as_list(Table([Column("magnitude_per", "g", [2.0])])).cells
+    {'quantity': ['magnitude per g'], 'value': ['2'], 'unit': ['']}
     """
     texts = [printed(column.header, column.values)[0] for column in table.columns]
+    names = [column.name.replace("_", " ") for column in table.columns]
+    units = [written(column.unit) for column in table.columns]
+    # a magnitude per g is not in g
+    per = [name.endswith(" per") for name in names]
     return Table(
         [
-            Column("quantity", "", [column.name.replace("_", " ") for column in table.columns]),
+            Column(
+                "quantity", "", [f"{n} {u}" if p else n for n, u, p in zip(names, units, per, strict=True)]
+            ),
             Column("value", "", texts),
-            Column("unit", "", [written(column.unit) for column in table.columns]),
+            Column("unit", "", ["" if p else u for u, p in zip(units, per, strict=True)]),
         ],
         ["quantity"],
         above=table.above,
