@@ -244,6 +244,8 @@ def test_a_dyad_stretched_all_along(dalembert: Dalembert, tmp_path: Path) -> Non
     assert done.returncode in (0, 1)
     if done.returncode == 0:
         assert json.loads(done.stdout)["check"]["change_points_deg"] == []
+    else:
+        assert "cannot be assembled" in done.stderr
 
 
 def test_a_dyad_between_points_that_coincide(dalembert: Dalembert) -> None:

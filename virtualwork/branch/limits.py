@@ -273,7 +273,11 @@ class Reach:
                         gap = track.assembly.case(step).gap(st)
                     if gap is not None:
                         return Shortfall(step.name, gap, self._nearest(inputs[0]))
-                track.run([step], st)
+                try:
+                    track.run([step], st)
+                except ZeroDivisionError:
+                    # the ends of a dyad coincide: what follows has no place, and no gap
+                    return None
         return None
 
     def nowhere(self, of: str = "") -> AssemblyError:
