@@ -22,8 +22,9 @@ from virtualwork.intime.watch import Floats, Rate, Value, Watch
 from virtualwork.plan.steps import Plan
 
 # Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
-# how far off the last pose may be to begin from
-LIMIT, CLOSE, FAR = 8, 1e-9, 0.3
+# how far off the last pose may be to begin from; by what share a step has to be shorter than the one before, so that it is
+# the nearest solution that they lead to
+LIMIT, CLOSE, FAR, SURE = 8, 1e-9, 0.3, 0.25
 
 
 class Placed:
@@ -56,6 +57,8 @@ class Placed:
         self.scale = {
             name: 1.0 if i < len(g.angles) else size for g in self.larger for i, name in enumerate(g.unknowns)
         }
+        # a turn further the same mechanism may stand in another way
+        self._units = [size if e.is_slide else 1.0 for e in assembly.mechanism.inputs]
         self._at: Floats = []
         self._x: dict[str, float] = {}
         self._state: tuple[Floats, State] = [], State([])
@@ -83,7 +86,8 @@ class Placed:
 
     def _settled(self, q: Floats) -> dict[str, float]:
         """All unknowns at the inputs."""
-        result = self._followed(q) if self._x and not self.crosses() else None
+        near = all(abs(a - b) <= FAR * unit for a, b, unit in zip(q, self._at, self._units, strict=False))
+        result = self._followed(q) if self._x and near and not self.crosses() else None
         if result is None:
             st = self.state(q)
             result = {
@@ -97,7 +101,7 @@ class Placed:
         """The same from those of the last pose; None where that does not lead there."""
         if self.tape is None or self._step is None:
             return None
-        now = self._x
+        now, last = self._x, math.inf
         given = {name: of(0.0, q, q) for name, of in self.known.items()}
         for _ in range(LIMIT):
             try:
@@ -109,8 +113,13 @@ class Placed:
             before, now = now, dict(zip(self.tape.names, solved, strict=True))
             if not all(abs(value - self._x[name]) <= FAR * self.scale[name] for name, value in now.items()):
                 return None
-            if all(abs(value - before[name]) <= CLOSE * self.scale[name] for name, value in now.items()):
+            moved = max(abs(value - before[name]) / self.scale[name] for name, value in now.items())
+            if moved <= CLOSE:
                 return now
+            if not moved <= SURE * last:
+                # another solution is near
+                return None
+            last = moved
         return None
 
     def angle(self, body: str) -> Value:
