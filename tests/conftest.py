@@ -75,7 +75,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 # of a test with a table of cases so many run at once; the others are slow, so that README's command stays short
-CASES = 2
+CASES = 1
 
 
 @pytest.hookimpl(tryfirst=True)
