@@ -207,7 +207,15 @@ def test_rounding_is_nothing_for_a_shaft_to_balance(dalembert: Dalembert, places
     rows = "1,17,33,7,45,150,530,410\n2,131,-71,-130,51,170,710,370\n3,-299,200,61,37,140,290,110\n"
     shafts = [word for z in places for word in ("--shaft", f"1:{z}:with")]
     done = dalembert(
-        "engine", "-", "--speed", "3000rpm", "--counterweight-share", "0.5", *shafts, "--json", stdin=HEAD + rows
+        "engine",
+        "-",
+        "--speed",
+        "3000rpm",
+        "--counterweight-share",
+        "0.5",
+        *shafts,
+        "--json",
+        stdin=HEAD + rows,
     )
     result = json.loads(done.stdout)
     assert [shaft["unbalance_kg_m"] for shaft in result["shafts"]] == [0] * len(places)
