@@ -361,6 +361,8 @@ def influence(b: FieldBalancing) -> Table:
     ]
     stored = [ABSENT if c.state is not None and c.speed is None else c.speed for c in channels]
     in_json = [ABSENT if of is None else of for of in states]
+    against = rows.numbers(lambda s: np.broadcast_to(b.against(s.group)[:, None, None], s.alpha.shape))
+    lags = ["lag" if of else "lead" for of in against.tolist()] if against.any() else []
     state = Column("state", "", [of or "" for of in states], None, "state", in_json)
     columns = [
         names("sensor", [channel.sensor for channel in channels]),
@@ -370,6 +372,7 @@ def influence(b: FieldBalancing) -> Table:
         Column("magnitude_per", unit, to_si(size, per, unit), None, f"magnitude_per_{b.runs.per_si}", size),
         number("phase", "angle", degrees(alpha)),
         names("amplitude_unit", [b.runs.amplitude_unit] * len(size), place=None),
+        *([names("phase_sense", lags, place=None)] if lags else []),
         *_errors(b, rows, size),
     ]
     return rows.table(columns, (), "influence[]", hidden=[] if any(states) else [state])
