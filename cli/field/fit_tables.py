@@ -275,7 +275,21 @@ def predicted_run(b: FieldBalancing) -> Table:
     columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]
     planes = b.solved[0].planes
     above = f"a run with {masses_text(b, planes, b.run_to_predict(planes)) or 'no masses'} should read"
-    return rows.table(columns, READINGS, "predict[]", above)
+    against = any(b.against(solved.group).any() for solved in b.solved)
+    below = (
+        "phases in the sense of the mass angles: the instrument shows them with the other sign"
+        if against
+        else ""
+    )
+    return rows.table(columns, READINGS, "predict[]", above, below)
+
+
+def reverse(table: Table) -> None:
+    """Count the phases of a report's table as an instrument whose phases were reversed shows them."""
+    table.below = ""
+    for column in table.columns:
+        if column.name == "phase":
+            column.values = [v if v is None else round(-float(v) % 360, 2) for v in column.values]
 
 
 def _suggestions(b: FieldBalancing) -> Iterator[tuple[Rotor, NextRun]]:
