@@ -144,6 +144,11 @@ class Forces:
             true.off(getattr(self, quantity)(couple)) + hidden.reshape(-1, *(1,) * (true.ndim - 1))
         )
 
+    def turning(self, order: int, against: bool, couple: bool = False) -> complex:
+        """Return what turns with the crank, or against it, at an order: of ΣF, N, or of Σ z F, N·m; 0 where its terms cancel."""
+        total = complex(self._sums(couple)[against][order - 1])
+        return total if abs(total) > self.negligible(couple)[order - 1] else 0j
+
     def _sums(self, couple: bool) -> tuple[Complex, Complex]:
         """Return what turns with and against the crank, (K,) each."""
         lever = self.z[:, None] if couple else np.ones((len(self.z), 1))
@@ -255,8 +260,12 @@ def shaft_unbalances(
     >>> (abs(shaft) * 200**2).round(3), np.degrees(np.angle(shaft)).round(6)
     (array([127.013]), array([90.]))
     """
+    z = np.atleast_1d(as_array(z))
     part = (forces.against if against else forces.with_crank)[:, order - 1]
-    return opposite(part, forces.z, as_array(z)) / (order * speed) ** 2  # type: ignore[no-any-return]
+    couples = (False, True)[: len(z)]
+    if not (is_doubled(part) or any(forces.turning(order, against, couple) for couple in couples)):
+        return np.zeros(len(z), dtype=complex)
+    return opposite(part, forces.z, z) / (order * speed) ** 2  # type: ignore[no-any-return]
 
 
 def opposite(moment: Any, z: Any, planes: Any) -> Any:

@@ -148,6 +148,8 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
     if unit is None:
         if not suffix:
             raise ValueError(f"'{text}' has no unit (units: {names})")
+        if re.match(r",\d", suffix):
+            raise ValueError(f"'{text}' has a comma in its number: expected a decimal point")
         raise ValueError(
             f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {names}){nearest_unit(suffix, dimension)}"
         )

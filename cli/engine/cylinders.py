@@ -271,10 +271,9 @@ class Engine:
 
     def idle(self, shaft: Shaft, unbalance: complex) -> str:
         """Say why a shaft has nothing to balance; empty where it has."""
-        limit = self.on_the_crank.negligible()[shaft.order - 1] / (shaft.order * self.speed) ** 2
-        if abs(unbalance) > limit:
+        if unbalance:
             return ""
-        couple = self.on_the_crank.largest(couple=True)[shaft.order - 1] > 0
+        couple = self.on_the_crank.turning(shaft.order, shaft.against, couple=True)
         named = quote(f"{shaft.order}:{shaft.z:g}m:{'against' if shaft.against else 'with'}")
         if couple:
             return (

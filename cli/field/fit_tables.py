@@ -275,7 +275,21 @@ def predicted_run(b: FieldBalancing) -> Table:
     columns = [*vibration(b, value), amplitude(b, "amplitude_uncertainty", deviation)]
     planes = b.solved[0].planes
     above = f"a run with {masses_text(b, planes, b.run_to_predict(planes)) or 'no masses'} should read"
-    return rows.table(columns, READINGS, "predict[]", above)
+    against = any(b.against(solved.group).any() for solved in b.solved)
+    below = (
+        "phases in the sense of the mass angles: the instrument shows them with the other sign"
+        if against
+        else ""
+    )
+    return rows.table(columns, READINGS, "predict[]", above, below)
+
+
+def reverse(table: Table) -> None:
+    """Count the phases of a report's table as an instrument whose phases were reversed shows them."""
+    table.below = ""
+    for column in table.columns:
+        if column.name == "phase":
+            column.values = [v if v is None else round(-float(v) % 360, 2) for v in column.values]
 
 
 def _suggestions(b: FieldBalancing) -> Iterator[tuple[Rotor, NextRun]]:
@@ -361,6 +375,8 @@ def influence(b: FieldBalancing) -> Table:
     ]
     stored = [ABSENT if c.state is not None and c.speed is None else c.speed for c in channels]
     in_json = [ABSENT if of is None else of for of in states]
+    against = rows.numbers(lambda s: np.broadcast_to(b.against(s.group)[:, None, None], s.alpha.shape))
+    lags = ["lag" if of else "lead" for of in against.tolist()] if against.any() else []
     state = Column("state", "", [of or "" for of in states], None, "state", in_json)
     columns = [
         names("sensor", [channel.sensor for channel in channels]),
@@ -370,6 +386,7 @@ def influence(b: FieldBalancing) -> Table:
         Column("magnitude_per", unit, to_si(size, per, unit), None, f"magnitude_per_{b.runs.per_si}", size),
         number("phase", "angle", degrees(alpha)),
         names("amplitude_unit", [b.runs.amplitude_unit] * len(size), place=None),
+        *([names("phase_sense", lags, place=None)] if lags else []),
         *_errors(b, rows, size),
     ]
     return rows.table(columns, (), "influence[]", hidden=[] if any(states) else [state])

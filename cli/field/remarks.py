@@ -26,7 +26,14 @@ def warnings(b: FieldBalancing) -> list[str]:
     fits = (sentence for group in groups for sentence in group.of_fit()) if b.runs.fitted else ()
     return [
         *dict.fromkeys(
-            [*b.runs.warnings, *_not_turned(b), *b.warnings, *_without_trials(groups), *sentences]
+            [
+                *b.runs.warnings,
+                *_not_turned(b),
+                *_other_sense(b),
+                *b.warnings,
+                *_without_trials(groups),
+                *sentences,
+            ]
         ),
         *fits,
     ]
@@ -43,6 +50,16 @@ def _not_turned(b: FieldBalancing) -> Iterator[str]:
         yield (
             f"the phases of {len(others)} rotor{'s' * (len(others) > 1)} ({named}) were not reversed: their runs do not "
             "determine the sense; if one instrument read all rotors, add --phase-lag"
+        )
+
+
+def _other_sense(b: FieldBalancing) -> Iterator[str]:
+    """Name the stored coefficients of a phase that lags where the phases of the runs were not reversed."""
+    leads = b.request.lagging is None and not all(b.against(solved.group).all() for solved in b.solved)
+    for file in b.runs.lagging_files if leads else ():
+        yield (
+            f"{file}: the coefficients were measured with a phase that lags, and the phases of the runs were not reversed: with "
+            "the same instrument add --phase-lag, or the angles are wrong (--rotation ccw: this one's phase leads)"
         )
 
 

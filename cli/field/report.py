@@ -11,6 +11,7 @@ import numpy as np
 
 from balancing.picture import Vibration, vibration
 from cli.field.field_balancing import FieldBalancing
+from cli.field.fit_tables import predicted, reverse, spread, suggested
 from cli.field.remarks import instrument, sense
 from cli.field.rotor import Rotor, each
 from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
@@ -72,6 +73,8 @@ class _Pages:
         self.rotor, self.b, self.solved, self.i, self.last = rotor, rotor.b, rotor.solved, rotor.i, rotor.last
         self.tables = {name: _of_rotor(table, rotor.name) for name, table in made.items() if table.columns}
         self.unit, self.against = rotor.b.runs.amplitude_unit, rotor.against
+        if self.against and "predict" in self.tables:
+            reverse(self.tables["predict"])
 
     def parts(self, *of: str) -> list[str | Table]:
         """Return tables of the result, where there are such, between the sentences above and below them."""
@@ -255,7 +258,7 @@ class _Pages:
         columns = [
             c
             for c in table.columns
-            if c.name not in ("correlation", "amplitude_unit")
+            if c.name not in ("correlation", "amplitude_unit", "phase_sense")
             and any(v == v and v is not None for v in c.values)
         ]
         left = influence.length - COEFFICIENTS
@@ -266,10 +269,10 @@ class _Pages:
         far = next(c for c in residuals.columns if c.name == "standardized").values
         worst = sorted(range(len(far)), key=lambda k: -float(far[k] or 0))[:READINGS]
         table = _rows_of(residuals, sorted(worst))
+        if self.against:
+            reverse(table)
         for column in table.columns:
-            if column.name == "phase" and self.against:
-                column.values = [round(-float(v or 0) % 360, 2) for v in column.values]
-            elif column.name in ("residual", "residual_phase", "standardized"):
+            if column.name in ("residual", "residual_phase", "standardized"):
                 column.values = [v if v is None else float(f"{float(v):.3g}") for v in column.values]
         left = len(far) - len(worst)
         rest = f"{left} further readings lie nearer to the fit than these (--json has all)." if left else ""
@@ -321,7 +324,6 @@ def _on_places(b: FieldBalancing, w: complex) -> list[float]:
 def _history(b: FieldBalancing, rotor: Rotor) -> History:
     from balancing import region_factor
     from balancing.log_picture import History
-    from cli.field.fit_tables import predicted, suggested
 
     solved, i, balance = rotor.solved, rotor.i, rotor.solved.fitted
     spreads, prediction, masses = [], None, None
@@ -380,7 +382,6 @@ def machine_page(b: FieldBalancing) -> Page:
     """
     from balancing import initial_unbalance
     from balancing.sheet import machine_sheet
-    from cli.field.fit_tables import spread
 
     runs, request = b.runs, b.request
     if len(runs.rotors) > 1:

@@ -209,9 +209,11 @@ def document_part(p: Positions, place: str, part: Complex) -> Table:
     one = np.array([complex(part)])
     columns = [
         size(p, p.quantity, np.abs(one), p.quantity),
-        direction(p, one, "{}"),
+        number("angle", "angle", degrees(one), place="angle"),
         size(p, "uncertainty", [float(p.parts.uncertainty)], "uncertainty"),
     ]
+    if p.quantity == "amplitude":
+        columns.insert(2, direction(p, one, "{}"))
     return Table([], place=place, documented=columns)
 
 

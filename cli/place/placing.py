@@ -213,7 +213,7 @@ class Share:
     def error(self) -> complex:
         """The error of the masses; zero where it is rounding."""
         error = self.placed.error
-        return error if abs(error) > 1e-14 * abs(self.goal) else 0j
+        return error if abs(error) > 1e-14 * max(abs(self.goal), float(self.placed.masses.sum())) else 0j
 
 
 class Placed(NamedTuple):
@@ -240,7 +240,12 @@ class Placing:
         self.opposite = request.drill is not None and not request.remove
         goal = -self.target * request.ratio if self.opposite else self.target * request.ratio
         if self.target == 0:
-            self.warnings.append("the corrections add up to nothing: there is nothing to place")
+            rest = (
+                "there is nothing to place"
+                if not request.weights
+                else "the weights are set against each other"
+            )
+            self.warnings.append(f"the corrections add up to nothing: {rest}")
         goals: list[tuple[float | None, complex]] = [(None, goal)]
         if request.planes is not None:
             at, planes = request.planes

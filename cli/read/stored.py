@@ -90,6 +90,11 @@ class Stored:
     across: Real | None = None
 
     @property
+    def lags(self) -> bool:
+        """Whether the phases of the instrument lagged that measured them."""
+        return "lag" in self.table.texts.get("phase_sense", ())
+
+    @property
     def rotors(self) -> list[str]:
         """The machines that the file names."""
         return list(dict.fromkeys(self.table.texts.get("rotor", ())))
@@ -224,11 +229,12 @@ class Stored:
                 if not best:
                     raise DataError(f"{self.table.file}: no coefficient of sensor {channel} for plane {name}")
                 if len(best) > 1:
+                    speeds = ", or runs with a speed" if channel.speed is None else ""
                     raise self.table.error(
                         best[1],
                         "sensor",
                         sensor[best[1]],
-                        f"one coefficient for sensor {channel} and plane {name}",
+                        f"one coefficient for sensor {channel} and plane {name}{speeds}",
                     )
                 at[s, p] = best[0]
         return at
@@ -287,7 +293,7 @@ def read_stored(path: str) -> Stored:
             "reading_sd": "amplitude",
             "degrees_of_freedom": "number",
         },
-        texts=["rotor", "sensor", "state", "plane", "amplitude_unit", "correlation"],
+        texts=["rotor", "sensor", "state", "plane", "amplitude_unit", "phase_sense", "correlation"],
         blank=["speed", "magnitude_uncertainty_per", "phase_uncertainty", "reading_sd", "degrees_of_freedom"],
     )
     size, phase = table.require("magnitude_per", "per"), table.require("phase", "angle")

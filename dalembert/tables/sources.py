@@ -256,10 +256,16 @@ def _are_units(
     if any(map(_is_number, cells)):
         return False
     units = [k for k, cell in enumerate(cells[: len(headings)]) if is_unit(cell)]
+    if texts is not None and any(likeness([headings[k]], dimensions, ()) for k in units):
+        return True
+    filled = [k for k, cell in enumerate(cells) if cell.strip(" -[]()")]
+    if not (rest and units) or units != filled:
+        return False
     if texts is None:
-        filled = [k for k, cell in enumerate(cells) if cell.strip(" -[]()")]
-        return bool(rest and units) and units == filled and all(_is_number(rest[0][1][k]) for k in units)
-    return any(likeness([headings[k]], dimensions, ()) for k in units)
+        return all(_is_number(rest[0][1][k]) for k in units)
+    # a header over two columns names one of them, and its words may be foreign
+    numbers = [cell for k in units for cell in rest[0][1][k : k + 1] if cell.strip()]
+    return len(units) > 1 and bool(numbers) and all(map(_is_number, numbers))
 
 
 def _take_units(source: Source, line: int, cells: list[str], dimensions: Mapping[str, str]) -> None:

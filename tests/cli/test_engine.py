@@ -201,6 +201,30 @@ def test_shafts_with_nothing_to_balance_are_named(dalembert: Dalembert) -> None:
     assert "one shaft cannot balance it; add a second one" in done.stderr
 
 
+@pytest.mark.parametrize("places", [["10mm"], ["10mm", "90mm"], ["90mm", "10mm"], ["0mm", "50mm", "90mm"]])
+def test_rounding_is_nothing_for_a_shaft_to_balance(dalembert: Dalembert, places: list[str]) -> None:
+    """Half of the reciprocating masses on the crank leave no first order that turns with it, and no couple."""
+    rows = "1,17,33,7,45,150,530,410\n2,131,-71,-130,51,170,710,370\n3,-299,200,61,37,140,290,110\n"
+    shafts = [word for z in places for word in ("--shaft", f"1:{z}:with")]
+    done = dalembert(
+        "engine",
+        "-",
+        "--speed",
+        "3000rpm",
+        "--counterweight-share",
+        "0.5",
+        *shafts,
+        "--json",
+        stdin=HEAD + rows,
+    )
+    result = json.loads(done.stdout)
+    assert [shaft["unbalance_kg_m"] for shaft in result["shafts"]] == [0] * len(places)
+    assert all("the shaft has nothing to balance" in text for text in result["warnings"])
+    assert len(result["warnings"]) == len(places)
+    against = engine(dalembert, HEAD + rows, "--counterweight-share", "0.5", "--shaft", "1:10mm:against")
+    assert against["shafts"][0]["unbalance_kg_m"] > 1e-4
+
+
 ROW = "1,0,90,0,45,150,500,400\n"
 BAD = {
     "a short rod": (

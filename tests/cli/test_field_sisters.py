@@ -297,3 +297,59 @@ def test_what_cannot_be_used_is_said(
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
     for word in words:
         assert word in done.stderr
+
+
+# -- the sense of the phase of stored coefficients ---------------------------------------------------------------
+
+HEADER = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
+LAGGING = "coefficients were measured with a phase that lags"
+
+
+def lagging_runs(count: int) -> str:
+    """The runs of 80 µm at 40° and 2 µm/g at 150°, on an instrument that counts the other way."""
+    masses = (0, 10, 10j, -10)[:count]
+    rows = []
+    for run, on in enumerate(masses):
+        v = np.conj(80 * np.exp(1j * np.radians(40)) + 2 * np.exp(1j * np.radians(150)) * on)
+        trial = f"A,{abs(on)!r},{float(np.degrees(np.angle(on)))!r}" if on else ",,"
+        rows.append(f"{run},1,{float(abs(v))!r},{float(np.degrees(np.angle(v)))!r},{trial}\n")
+    return HEADER + "".join(rows)
+
+
+@pytest.mark.parametrize(("count", "options"), [(2, ("--phase-lag",)), (2, ("--rotation", "cw")), (4, ())])
+def test_coefficients_of_a_lagging_phase_are_not_used_silently(
+    count: int, options: tuple[str, ...], dalembert: Dalembert
+) -> None:
+    done = dalembert("field", "-", *options, "--save-influence", "c.csv", stdin=lagging_runs(count))
+    assert done.returncode == 0, done.stderr
+
+    def later(*more: str) -> tuple[complex, str]:
+        result = dalembert("field", "-", "--influence", "c.csv", *more, "--json", stdin=lagging_runs(1))
+        (fix,) = json.loads(result.stdout)["rotors"][0]["corrections"]
+        return fix["mass_kg"] * 1e3 * np.exp(1j * np.radians(fix["angle_deg"])), result.stderr + result.stdout
+
+    # −V0/α, 40 g at 40 + 180 − 150 = 70°
+    right, says = later("--phase-lag")
+    assert right == pytest.approx(40 * np.exp(1j * np.radians(70)), rel=1e-9)
+    assert LAGGING not in says
+    wrong, says = later()
+    assert abs(wrong - right) > 1
+    assert "c.csv: the " + LAGGING in says
+    assert "add --phase-lag" in says
+    assert LAGGING not in later("--rotation", "ccw")[1]
+
+
+def test_coefficients_of_a_leading_phase_need_no_word(dalembert: Dalembert) -> None:
+    dalembert("field", "-", "--save-influence", "c.csv", stdin=lagging_runs(2))
+    for options in ((), ("--phase-lag",)):
+        done = dalembert("field", "-", "--influence", "c.csv", *options, stdin=lagging_runs(1))
+        assert done.returncode == 0
+        assert LAGGING not in done.stderr
+
+
+def test_coefficients_at_speeds_for_runs_without_one(dalembert: Dalembert, tmp_path: Path) -> None:
+    stored = "sensor,speed_rpm,plane,magnitude_per_g,phase_deg\n1,1500,A,2,150\n1,3000,A,3,10\n"
+    (tmp_path / "c.csv").write_text(stored)
+    done = dalembert("field", "-", "--influence", "c.csv", stdin=lagging_runs(1))
+    assert done.returncode == 1
+    assert "expected one coefficient for sensor 1 and plane A, or runs with a speed" in done.stderr

@@ -250,6 +250,48 @@ def test_a_cell_may_hold_amplitude_and_phase(dalembert: Dalembert, mark: str, de
         assert any("read size and angle (degrees) from the cells of" in line for line in result["warnings"])
 
 
+@pytest.mark.parametrize("mark", [" @ ", "@", " ∠ ", " / ", "<"])
+@pytest.mark.parametrize(("unit", "mass"), [(" mm/s", " g"), ("mm/s", "g"), ("", " g"), (" mm/s", "")])
+def test_a_cell_may_have_the_unit_of_its_header(
+    dalembert: Dalembert, mark: str, unit: str, mass: str
+) -> None:
+    text = (
+        f"run;sensor;amplitude_mm_s;trial_plane;trial_mass_g\n0;1;4,0{unit}{mark}90°;;\n"
+        f"1;1;2,0{unit}{mark}90;A;5{mass}{mark}0°\n"
+    )
+    (fix,) = document(dalembert("field", "-", "--json", stdin=text))["rotors"][0]["corrections"]
+    assert fix["mass_kg"] == pytest.approx(0.010, rel=1e-12)
+    assert fix["angle_deg"] % 360 == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("cell", "says"),
+    [
+        ("2 um @ 90°", "found '2 um @ 90°', expected mm_s, the unit in the header"),
+        ("2 mm @ 90°", "expected mm_s, the unit in the header"),
+        ("2 in/s @ 90°", "expected mm_s, the unit in the header"),
+        ("2 mm/s @ 12 o'clock", "expected size@angle as in other rows"),
+        ("2 mm/s", "expected size@angle as in other rows"),
+    ],
+)
+def test_a_cell_of_another_unit_is_refused(dalembert: Dalembert, cell: str, says: str) -> None:
+    text = f"run,sensor,amplitude_mm_s,trial_plane,trial_mass_g\n0,1,4@90,,\n1,1,{cell},A,5@0\n"
+    done = dalembert("field", "-", stdin=text)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"row 2 (line 3), column amplitude_mm_s: found '{cell}'" in done.stderr
+    assert says in done.stderr
+
+
+@pytest.mark.parametrize("first", ["Lager A", "A", "1"])
+def test_a_header_over_two_columns_with_units_below(dalembert: Dalembert, first: str) -> None:
+    rows = "0;4;90;1;0;;;\n1;2;90;1;0;P;5;0\n"
+    over = f"Lauf;{first};;Lager B;;Ebene;Masse;Winkel\n;mm/s;°;mm/s;°;;g;°\n{rows}"
+    plain = f"Lauf;{first} [mm/s];{first} [°];Lager B [mm/s];Lager B [°];Ebene;Masse [g];Winkel [°]\n{rows}"
+    one, other = (document(dalembert("field", "-", "--json", stdin=text)) for text in (over, plain))
+    assert one["rotors"] == other["rotors"]
+    assert one["rotors"][0]["corrections"][0]["mass_kg"] == pytest.approx(0.010, rel=1e-12)
+
+
 @pytest.mark.parametrize("dash", ["-", "\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}", " - "])
 @pytest.mark.parametrize(
     "table",

@@ -57,6 +57,7 @@ def test_three_positions_of_amplitudes_and_the_sense_of_the_phase(dalembert: Dal
         assert found["amplitude_unit"] == "um"
         assert vector(found["rotor"], "amplitude", "phase_deg") == pytest.approx(rotor, rel=1e-14)
         assert vector(found["mandrel"], "amplitude", "phase_deg") == pytest.approx(mandrel, rel=1e-14)
+        assert all(found[part]["angle_deg"] == found[part]["phase_deg"] for part in ("rotor", "mandrel"))
 
 
 def test_least_squares_and_its_scatter_against_numpy() -> None:

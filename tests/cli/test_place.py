@@ -196,3 +196,17 @@ def test_an_option_without_the_one_that_it_goes_with(
     assert done.returncode == 2
     assert option in done.stderr
     assert other in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("83,5g@30deg",),
+        ("83.5g@308,87deg",),
+        ("5g@30deg", "--at-radius", "20,5mm", "--to-radius", "30mm"),
+    ],
+)
+def test_a_decimal_comma_in_an_option_is_named(arguments: tuple[str, ...], dalembert: Dalembert) -> None:
+    done = dalembert("place", *arguments)
+    assert done.returncode == 2
+    assert "has a comma in its number: expected a decimal point" in done.stderr

@@ -129,3 +129,13 @@ def test_what_does_not_go_with_weights(options: tuple[str, ...], dalembert: Dale
     done = dalembert("place", "6g@30deg", "--weights", "4g,4g", *options)
     assert done.returncode == 2
     assert "--weights" in done.stderr
+
+
+@pytest.mark.parametrize("weights", ["4g,4g", "4g,4g,4g", "5g,3g,2g", "4g,3g,2g,1g"])
+@pytest.mark.parametrize("correction", [["0g@0deg"], ["3g@10deg", "3g@190deg"]])
+def test_weights_for_no_correction_cancel(dalembert: Dalembert, correction: list[str], weights: str) -> None:
+    result = placed(dalembert, *correction, "--weights", weights)
+    assert len(result["masses"]) == weights.count(",") + 1
+    assert abs(total(result)) < 1e-15 * 0.012
+    assert (result["error_kg"], result["error_angle_deg"]) == (0, 0)
+    assert result["warnings"] == ["the corrections add up to nothing: the weights are set against each other"]

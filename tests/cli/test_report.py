@@ -297,6 +297,29 @@ def readings(lagging: bool, last: bool = True) -> str:
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.parametrize("lagging", [False, True])
+def test_a_predicted_run_has_the_phase_that_the_instrument_will_show(
+    lagging: bool, dalembert: Dalembert, tmp_path: Path
+) -> None:
+    """4 µm at 30° and 2 µm/g at 100°: with 3 g at 20° the run reads 4∠30° + 6∠120° = 7.21∠86.3°, lagging −86.3°."""
+    sense = -1 if lagging else 1
+    rows = f"0,1,4,{30 * sense},,,\n1,1,{abs(4 + 2j)!r},{sense * float(30 + np.degrees(np.arctan2(2, 4)))!r},A,1,20\n"
+    text = f"run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n{rows}"
+    options = ["--phase-lag"] if lagging else []
+    call = ("field", "-", *options, "--predict", "3g@20deg")
+    done = dalembert(*call, "--report", "r.html", "-o", "o.csv", stdin=text)
+    assert done.returncode == 0, done.stderr
+    page = read(tmp_path / "r.html")
+    (table,) = (t for t in page.tables if any("amplitude uncertainty" in cell for cell in t[0]))
+    turn = 30 + np.degrees(np.arctan2(6, 4))
+    assert [float(cell) for cell in table[1][1:3]] == pytest.approx(
+        [np.hypot(4, 6), sense * turn % 360], rel=1e-4
+    )
+    assert not any("phase sense" in t[0] for t in page.tables if "magnitude per [g]" in t[0])
+    shown = dalembert(*call, "--text", stdin=text).stdout
+    assert ("the instrument shows them with the other sign" in shown) == lagging
+
+
 LIMITS = ("--grade", "G6.3", "--speed", "1480rpm", "--rotor-mass", "20kg", "--radius", "200mm")
 
 

@@ -284,11 +284,13 @@ def is_wide(source: Source) -> bool:
 
 
 def _columns(headings: Sequence[Heading]) -> Iterator[_Column]:
-    """Yield the columns that are known, with what they are taken for."""
-    before = ""
+    """Yield the columns that are known, with what they are taken for; under a header over two columns both are of one place."""
+    before: _Column | None = None
     for place, each in enumerate(headings):
-        column = _known(place, each, before)
-        before = "" if column is None else column.kind
+        column = _known(place, each, before.kind if before else "")
+        if before and column and not each.written:
+            column = replace(column, heading=before.heading, of=before.of)
+        before = column
         if column is not None:
             yield column
 

@@ -18,7 +18,7 @@ from dalembert.tables.files import read_bytes, remember, split_sheet
 from dalembert.tables.headers import Heading, plain_word, words_of
 from dalembert.tables.sources import LINE, Source, decoded, open_source, without_dashes
 from dalembert.tables.table import Cells, Numbers, Table
-from dalembert.units import find_unit, parted
+from dalembert.units import find_unit, parted, unit_name
 
 AMPLITUDE, UNBALANCE = words_of("amplitude"), words_of("unbalance")
 MASS = words_of("mass", "weight", "trial_mass")
@@ -290,18 +290,20 @@ def _polar(file: str, key: str, cell: str) -> tuple[str, str]:
 
 # -- cells of a table that hold size and angle ------------------------------------------------------------------
 
-POLAR = re.compile(r"([-+\d.,e]*\d)\s*[@∠<∡/]\s*([-+\u2212\d.,]*\d)\s*(?:°|deg)?", re.IGNORECASE)
+POLAR = re.compile(
+    r"([-+\d.,e]*\d)\s*([^\W\d_][^@∠<∡]*?)?\s*[@∠<∡/]\s*([-+\u2212\d.,]*\d)\s*(?:°|deg)?", re.IGNORECASE
+)
 FIRST = 50
 """So many rows show whether the cells of a column hold vectors."""
 
 
 def parted_cells(source: Source) -> Source:
-    """Return a table in which each column of cells such as `12@45`, `12∠45°` or `12 / 45` is two, the second its angle."""
-    names = {k: name for k, each in enumerate(source.headings) if (name := _name_of_angle(each))}
+    """Return a table in which each column of cells such as `12@45`, `12 mm/s ∠ 45°` or `12 / 45` is two, the second its angle."""
+    sizes = {k: size for k, each in enumerate(source.headings) if (size := _size_of(each))}
     head = [cells for _, cells in islice(source.rows(), FIRST)]
     columns = {
-        k: name
-        for k, name in names.items()
+        k: size
+        for k, size in sizes.items()
         if any(
             POLAR.fullmatch(part.strip()) for cells in head if k < len(cells) for part in cells[k].split(";")
         )
@@ -312,13 +314,13 @@ def parted_cells(source: Source) -> Source:
     headings = [
         one
         for k, each in enumerate(source.headings)
-        for one in (each, *([Heading(each.written, columns[k], "deg")] if k in columns else []))
+        for one in (each, *([Heading(each.written, columns[k].angle, "deg")] if k in columns else []))
     ]
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         for i, (line, cells) in enumerate(source.rows()):
             parts = [
-                _sizes_and_angles(source, i, k, cell) if k in columns else (cell,)
+                _sizes_and_angles(source, i, k, cell, columns[k]) if k in columns else (cell,)
                 for k, cell in enumerate(cells)
             ]
             yield line, [one for part in parts for one in part]
@@ -328,9 +330,17 @@ def parted_cells(source: Source) -> Source:
     return source.laid_out(headings, rows())
 
 
-def _name_of_angle(each: Heading) -> str:
-    """Return what the column of the angles that belong to a vibration or a mass is called; empty for other columns."""
-    stem, unit = (each.base, each.unit) if each.unit else parted(each.name)
+class _Size(NamedTuple):
+    """A column of sizes, and what the column of their angles is called."""
+
+    dimension: str
+    unit: str
+    angle: str
+
+
+def _size_of(each: Heading) -> _Size | None:
+    """Return what a column of vibrations or masses holds; None for other columns."""
+    stem, written = (each.base, each.unit) if each.unit else parted(each.name)
     words = stem.split("_")
     plain = [plain_word(word) for word in words]
     for kinds, dimension, name in (
@@ -338,17 +348,21 @@ def _name_of_angle(each: Heading) -> str:
         (UNBALANCE, "unbalance", "angle"),
         (AMPLITUDE, "amplitude", "phase"),
     ):
-        if find_unit(dimension, unit) and any(word in kinds for word in plain):
-            return "_".join(name if p in kinds else word for p, word in zip(plain, words, strict=True))
-    return f"phase_{stem}" if find_unit("amplitude", unit) else ""
+        if (unit := find_unit(dimension, written)) and any(word in kinds for word in plain):
+            angle = "_".join(name if p in kinds else word for p, word in zip(plain, words, strict=True))
+            return _Size(dimension, unit, angle)
+    unit = find_unit("amplitude", written)
+    return _Size("amplitude", unit, f"phase_{stem}") if unit else None
 
 
-def _sizes_and_angles(source: Source, row: int, column: int, cell: str) -> tuple[str, str]:
+def _sizes_and_angles(source: Source, row: int, column: int, cell: str, size: _Size) -> tuple[str, str]:
     """Return the sizes and the angles of a cell, several joined by ';'."""
     parts = without_dashes(part.strip() for part in cell.split(";"))
-    matches = [POLAR.fullmatch(part) for part in parts]
+    matches = [match for part in parts if (match := POLAR.fullmatch(part))]
     if not any(parts) or parts == ["0"]:
         return cell, ""
-    if not all(matches):
+    if len(matches) < len(parts):
         raise source.error(row, source.header[column], cell, "size@angle as in other rows, such as 80@40")
-    return ";".join(m[1] for m in matches if m), ";".join(m[2] for m in matches if m)
+    if any(m[2] and find_unit(size.dimension, unit_name(m[2])) != size.unit for m in matches):
+        raise source.error(row, source.header[column], cell, f"{size.unit}, the unit in the header")
+    return ";".join(m[1] for m in matches), ";".join(m[3] for m in matches)
