@@ -85,6 +85,7 @@ def test_what_is_no_recording(t: list[float], mark: list[float], says: str) -> N
         once_per_turn(t, np.ones((4, 1)), mark)
 
 
+@pytest.mark.slow
 def test_several_pulses_in_a_turn_tell_a_speed_that_varies_within_it() -> None:
     t = np.arange(40_000) / 20_000
     angle = 2 * np.pi * 11.3 * t + 0.4 * np.sin(2 * np.pi * 11.3 * t) + 0.5

@@ -150,6 +150,7 @@ def question(v):
     return Loop(Poses(cases, ShowOptions()), 2)
 
 
+@pytest.mark.slow
 def test_a_part_whose_worker_died_is_done_again(tmp_path):
     flag = tmp_path / "died"
     dies_once = f"(p := __import__('pathlib').Path({str(flag)!r})).exists() or (p.touch(), __import__('os')._exit(1)) and None"

@@ -52,6 +52,7 @@ def test_limits_are_where_a_scan_can_go_no_further() -> None:
     assert _limits(range(18)) > 2
 
 
+@pytest.mark.slow
 def test_every_assembly_is_listed_and_closes() -> None:
     assert _assemblies(range(60)) > 2
 
@@ -73,6 +74,7 @@ def test_dead_points_of_every_range(seed: int) -> None:
     assert wrong_dead_points(t) == []
 
 
+@pytest.mark.slow
 def test_dead_points_are_where_a_scan_can_go_no_further() -> None:
     met = 0
     for seed in range(40):

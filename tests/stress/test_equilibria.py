@@ -28,6 +28,7 @@ def _none_wrong(seeds: range) -> None:
         assert faults(*scene(np.random.default_rng(seed))) == [], f"seed {seed}"
 
 
+@pytest.mark.slow
 def test_equilibria_of_four_bars_and_slider_cranks() -> None:
     _none_wrong(range(60))
 

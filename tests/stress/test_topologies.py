@@ -67,6 +67,7 @@ def _tally(seeds: range) -> None:
     assert found["refused"] > 0.05 * len(seeds)
 
 
+@pytest.mark.slow
 def test_mechanisms_of_any_topology_stand_at_their_guess_or_are_refused() -> None:
     _tally(range(120))
 

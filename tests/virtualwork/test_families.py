@@ -209,6 +209,7 @@ def test_variants_with_change_points_and_limits_go_as_they_go_alone():
     assert "reach" in motion.reason(0) or "no nearer" in motion.reason(0)
 
 
+@pytest.mark.slow
 def test_a_guess_that_each_variant_reads_differently():
     """The guess gives points alone: which of two assemblies is nearer hangs on the variant's own lengths."""
     m = four_bar(guess=Guess(0.7, points={"C": (0.11, 0.01)}))

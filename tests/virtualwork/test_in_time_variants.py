@@ -75,6 +75,7 @@ def test_lanes_of_two_inputs_that_start_differently() -> None:
         assert runs.angle[i] == pytest.approx(one.angle, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_dead_points_and_friction_are_left_to_single_runs() -> None:
     family = four_bar("rocker").vary({"links.coupler.mass": [1.0, 2.0]})
     same_as_singly(family, family.simulate([0, 0.5, 1.0], speed=3.0), 1e-15, speed=3.0)

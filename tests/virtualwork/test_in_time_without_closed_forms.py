@@ -92,6 +92,7 @@ def test_a_chain_that_turns_back_as_a_whole_with_friction() -> None:
     assert apart(m, 0.25, 15.0, 1e-7, 1e-9) < 2e-7
 
 
+@pytest.mark.slow
 def test_a_frame_comes_to_rest_by_friction_and_stays() -> None:
     m = frame(friction=[Friction(name, 0.5, 0.1) for name in "ABCDEFG"])
     run = m.simulate([0, 0.5, 1, 20], speed=2.0, accuracy=1e-6)
