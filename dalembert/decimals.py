@@ -89,11 +89,13 @@ def times(value: Scaled, above: float, below: float) -> Scaled:
 
 
 def shown(value: Scaled, above: float, below: float) -> Scaled:
-    """Numbers in SI in the unit whose factor is above/below; where a decimal of 8 figures is converted to the number, that one.
+    """Convert numbers from SI to the unit with the factor above/below, back to the decimal they were read from.
+
+    If a decimal of at most 8 figures converts to the same number in SI, the result is that decimal.
 
     Examples
     --------
-    One pound-force is no short decimal in SI.
+    A number of pounds-force has no short decimal in newtons.
 
     >>> lbf = (8896443230521, 2 * 10**12)
     >>> times(times(2.3, *lbf), *reversed(lbf)), shown(times(2.3, *lbf), *lbf)

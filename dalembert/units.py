@@ -446,5 +446,5 @@ def to_si(value: Scaled, dimension: str, unit: str) -> Scaled:
 
 
 def from_si(value: Scaled, dimension: str, unit: str) -> Scaled:
-    """Convert a number or an array from SI to `unit`; what was a decimal of few figures there comes back as that."""
+    """Convert a number or an array from SI to `unit`: a short decimal in `unit` comes back as it was written."""
     return shown(value, *UNITS[dimension][unit])

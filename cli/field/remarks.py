@@ -59,7 +59,7 @@ def _other_sense(b: FieldBalancing) -> Iterator[str]:
     for file in b.runs.lagging_files if leads else ():
         yield (
             f"{file}: the coefficients were measured with a phase that lags, and the phases of the runs were not reversed: with "
-            "the same instrument add --phase-lag, or the angles are wrong (--rotation ccw: this one's phase leads)"
+            "the same instrument add --phase-lag, or the angles are wrong; if the phase of this instrument leads, add --rotation ccw"
         )
 
 

@@ -9,20 +9,21 @@ import pytest
 from tests.cli.printed import document
 from tests.conftest import Dalembert
 
+BOB = """
+gravity = [0, -9.81]
+[ground]
+O = [0, 0]
+[links.bob]
+points = { O = [0, 0] }
+mass = 2
+center = [0.5, 0]
+[input]
+link = "bob"
+"""
+
 
 def test_equilibrium(dalembert: Dalembert) -> None:
-    text = """
-    gravity = [0, -9.81]
-    [ground]
-    O = [0, 0]
-    [links.bob]
-    points = { O = [0, 0] }
-    mass = 2
-    center = [0.5, 0]
-    [input]
-    link = "bob"
-    """
-    found = document(dalembert("equilibrium", "-", "--json", stdin=text))
+    found = document(dalembert("equilibrium", "-", "--json", stdin=BOB))
     assert [(round(e["input_deg"], 9), e["stable"]) for e in found["equilibria"]] == [
         (90.0, False),
         (270.0, True),
@@ -33,20 +34,7 @@ def test_equilibrium(dalembert: Dalembert) -> None:
 
 def test_equilibrium_of_a_wound_spring(dalembert: Dalembert) -> None:
     """The angle has its whole turns, which the spring's torque depends on: it may be negative, and `forces` finds no effort there."""
-    text = """
-    gravity = [0, -9.81]
-    [ground]
-    O = [0, 0]
-    [links.bob]
-    points = { O = [0, 0] }
-    mass = 2
-    center = [0.5, 0]
-    [input]
-    link = "bob"
-    [[torsion_springs]]
-    links = ["ground", "bob"]
-    stiffness = 30
-    """
+    text = BOB + '[[torsion_springs]]\nlinks = ["ground", "bob"]\nstiffness = 30\n'
     (rest,) = document(dalembert("equilibrium", "-", "--json", stdin=text))["equilibria"]
     assert (-45 < rest["input_deg"] < 0, rest["stable"]) == (True, True)
     found = document(dalembert("forces", "-", "--at", f"{rest['input_deg']!r}deg", "--json", stdin=text))

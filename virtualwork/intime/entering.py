@@ -22,8 +22,8 @@ from virtualwork.intime.watch import Floats, Rate, Value, Watch
 from virtualwork.plan.steps import Plan
 
 # Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
-# how far off the last pose may be to begin from; by what share a step has to be shorter than the one before, so that it is
-# the nearest solution that they lead to
+# how far off the last pose may be to begin from; a step is at most this share of the one before, else another solution may be
+# as near
 LIMIT, CLOSE, FAR, SURE = 8, 1e-9, 0.3, 0.25
 
 
@@ -57,7 +57,7 @@ class Placed:
         self.scale = {
             name: 1.0 if i < len(g.angles) else size for g in self.larger for i, name in enumerate(g.unknowns)
         }
-        # a turn further the same mechanism may stand in another way
+        # from far off the steps may lead to another assembly: a turn later the mechanism need not stand as before
         self._units = [size if e.is_slide else 1.0 for e in assembly.mechanism.inputs]
         self._at: Floats = []
         self._x: dict[str, float] = {}
@@ -117,7 +117,7 @@ class Placed:
             if moved <= CLOSE:
                 return now
             if not moved <= SURE * last:
-                # another solution is near
+                # it may lead to another solution
                 return None
             last = moved
         return None
