@@ -14,7 +14,7 @@ from cli.cases.case import Case, Study
 from cli.cases.poses import bounds_of, cells, keys_of
 from cli.cases.study import METHOD
 from cli.read.options import processes
-from cli.tolerance.way import way
+from cli.tolerance.way import by_quantity, largest, way
 from dalembert.dataclass import dataclass
 from dalembert.drawing.amounts import NOISE
 from dalembert.errors import DataError
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.poses import Reals
+    from cli.show.result import Result
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
@@ -211,9 +212,18 @@ class Tolerances(Case):
     def _rounded(self, header: str, i: int) -> Reals:
         return self.rounded[header][i]
 
+    def result(self) -> Result:
+        """Return the result in every form: a terminal has a row for each quantity of a single pose."""
+        result = super().result()
+        if self.analysis.inputs.n == 1 and self.numbers:
+            result.screen = lambda: by_quantity(self.table(), self.numbers)
+        return result
+
     def further(self) -> dict[str, Callable[[], Table]]:
         """Return the largest shares of the variance, and how the mechanisms were drawn."""
-        tables: dict[str, Callable[[], Table]] = {"largest shares": self.largest} if self.linear else {}
+        tables: dict[str, Callable[[], Table]] = (
+            {"largest shares": lambda: largest(self.linear, self.limits)} if self.linear else {}
+        )
         return tables | ({"drawn": self.drawing} if self.draws else {})
 
     def documented(self) -> list[Table]:
@@ -232,19 +242,6 @@ class Tolerances(Case):
             names(name, [row[i] for row in rows]) for i, name in enumerate(("path", "column", "share"))
         ]
         return Table(columns, ("column", "path"), "tolerance.shares[]")
-
-    def largest(self) -> Table:
-        """Return the dimensions with the largest shares of each number, in the mean of the poses."""
-        texts = []
-        for effect in self.linear.values():
-            finite = np.isfinite(effect.shares).any()
-            mean = np.nanmean(effect.shares, axis=1) if finite else np.zeros(len(self.limits))
-            order = np.argsort(-mean, kind="stable")[:3]
-            paths = [d.path for d in self.limits]
-            texts.append(", ".join(f"{paths[i]} {mean[i] * 100:.3g} %" for i in order if mean[i] > 0))
-        above = "shares of the variance, means over the poses"
-        columns = [names("column", self.linear, None), names("dimensions", texts, None)]
-        return Table(columns, ("column",), "", above=above)
 
     def drawing(self) -> Table:
         """Return how the mechanisms were drawn."""

@@ -1,13 +1,14 @@
-"""The worked solution of tolerances: the terms of every dimension at one pose."""
+"""The tolerances at one pose: its tables on a terminal, the largest shares, and the worked solution with the terms of every dimension."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dalembert.results.columns import Table, finite, names
+from dalembert.results.columns import Column, Table, finite, names
 from dalembert.results.way import Topic
 
 if TYPE_CHECKING:
@@ -16,6 +17,52 @@ if TYPE_CHECKING:
     from virtualwork.family.tolerance import Spread
     from virtualwork.formulas.quantity import Quantity
     from virtualwork.quantities import Component
+
+
+def by_quantity(table: Table, shown: Sequence[Component]) -> list[Table]:
+    """Return the table of one pose as short tables: a row for each quantity that varies, one table for each unit.
+
+    The first has what names the pose.
+    """
+    columns = {each.header: each for each in table.columns}
+    units: dict[str, list[tuple[str, dict[str, Column]]]] = {}
+    for quantity in shown:
+        own = columns[quantity.header]
+        lead = f"{own.name}_"
+        row = {"value": own} | {
+            each.name.removeprefix(lead): each
+            for each in table.columns
+            if isinstance(each.place, tuple) and own.header in each.place
+        }
+        units.setdefault(own.unit, []).append((quantity.names[0] if quantity.names else own.name, row))
+
+    def errors(cells: Sequence[Column]) -> list[float]:
+        return [float("nan") if each.error is None else float(each.error()[0]) for each in cells]
+
+    made = [Table([each for each in table.columns if each.header in table.keys])]
+    for unit, rows in units.items():
+        lead_column = Column("quantity", "", [name for name, _ in rows])
+        numbers = []
+        for head in rows[0][1]:
+            cells = [row[head] for _, row in rows]
+            error = partial(errors, cells) if cells[0].error is not None else None
+            numbers.append(Column(head, unit, [each.values[0] for each in cells], error))
+        made.append(Table([lead_column, *numbers], ["quantity"]))
+    return made
+
+
+def largest(linear: Mapping[str, Spread], limits: Mapping[Dimension, float]) -> Table:
+    """Return the dimensions with the largest shares of each number, in the mean of the poses."""
+    texts, paths = [], [d.path for d in limits]
+    for effect in linear.values():
+        finite = np.isfinite(effect.shares).any()
+        mean = np.nanmean(effect.shares, axis=1) if finite else np.zeros(len(paths))
+        order = np.argsort(-mean, kind="stable")[:3]
+        texts.append(", ".join(f"{paths[i]} {mean[i] * 100:.3g} %" for i in order if mean[i] > 0))
+    above = "shares of the variance, means over the poses"
+    return Table(
+        [names("column", linear, None), names("dimensions", texts, None)], ("column",), "", above=above
+    )
 
 
 def way(

@@ -56,10 +56,23 @@ def plain(value: object) -> str | float:
     return str(value).lower() if isinstance(value, bool) else value  # type: ignore[return-value]
 
 
+NOISE = 1e-14
+"""Of the largest number of a column: what is smaller is what rounding left of 0."""
+
+
 def printed(name: str, column: Values) -> list[str]:
-    """Return a column's cells as they are shown: numbers to 6 significant digits."""
+    """Return a column's cells as they are shown: numbers to 6 significant digits, what rounding left of 0 as 0.
+
+    >>> printed("x_m", [0.04, 2.4e-18]), printed("x_m", [2.4e-18])
+    (['0.04', '0'], ['2.4e-18'])
+    """
     values = [plain(value) for value in column]
-    return [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
+    numbers = [abs(value) for value in values if isinstance(value, float) and isfinite(value)]
+    least = NOISE * max(numbers, default=0.0)
+    return [
+        (_six_digits(name, value) if abs(value) >= least else "0") if isinstance(value, float) else str(value)
+        for value in values
+    ]
 
 
 def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: int | None = None) -> str:
@@ -104,7 +117,9 @@ def as_list(table: Table) -> Table:
                 "quantity", "", [f"{n} {u}" if p else n for n, u, p in zip(names, units, per, strict=True)]
             ),
             Column("value", "", texts),
-            Column("unit", "", ["" if p else u for u, p in zip(units, per, strict=True)]),
+            Column(
+                "unit", "", ["" if p or t == "none" else u for t, u, p in zip(texts, units, per, strict=True)]
+            ),
         ],
         ["quantity"],
         above=table.above,

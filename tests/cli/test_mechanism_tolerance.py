@@ -226,3 +226,25 @@ rod = -0.1
     row = rows(drawn.stdout)[1]
     # an angle lies within its turn, drawn or not
     assert abs(float(row["rod_angle_drawn_mean_deg"]) - float(row["rod_angle_deg"])) < 0.1
+
+
+def test_one_pose_on_a_terminal_has_a_row_for_each_quantity(dalembert, file):
+    options = (file(), "--at", "60deg", "--only", "H,crank", "--draws", "8")
+    (whole,) = rows(dalembert("tolerance", *options, "--units", "mm").stdout)
+    lines = [
+        line.split() for line in dalembert("tolerance", *options, "--units", "mm", "--text").stdout.splitlines()
+    ]
+    assert ["quantity", "value_mm", "worst_mm", "sd_mm"] == next(x for x in lines if x[:1] == ["quantity"])[:4]
+    for name, header, unit in (("H.x", "H_x", "mm"), ("H.vy", "H_vy", "m_s")):
+        (row,) = (line for line in lines if line[:1] == [name])
+        cells = [f"{header}{middle}_{unit}" for middle in ("", "_worst", "_sd", "_drawn_mean", "_drawn_sd")]
+        assert row[1:6] == [f"{float(whole[cell]):.6g}" for cell in cells]
+    # the angle of the crank is set, so that it has no spread
+    assert not any(line[:1] == ["crank.angle"] for line in lines)
+    several = dalembert("tolerance", file(), "--at", "60deg", "--at", "90deg", "--only", "H", "--text").stdout
+    assert "H_x_worst_m" in several
+
+
+def test_without_a_number_that_varies_one_pose_has_its_row(dalembert, file):
+    run = dalembert("tolerance", file(), "--at", "60deg", "--only", "crank", "--text")
+    assert "crank_angle_deg" in run.stdout and "none of the numbers shown depends" in run.stderr
