@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 _VECTOR = "X,Y,Z"
 
 
-EXAMPLE = "riul-rod"
 OPTIONS = """
 Arguments:
   parts PARTS  CSV of parts; - is standard input.
@@ -47,7 +46,7 @@ Further options (docs/commands.md describes them):
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="riul-rod")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the forces and
     moments of its motion.

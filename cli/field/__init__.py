@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Column
 
 
-EXAMPLE = "fan-one-plane"
 METHOD = (
     "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
     "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
@@ -84,7 +83,7 @@ Further options (docs/commands.md describes them):
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="fan-one-plane")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
