@@ -17,7 +17,7 @@ Rotors (`balancing`):
     influence_coefficients, influence_error, influence_from_amplitudes, initial_alone,
     initial_unbalance, joint_fit, journal_loads, least_squares, mil_unbalance, minimax,
     modal_corrections, once_per_turn, outlier_probability, permissible_unbalance, phase_sense,
-    place_from_stock, place_masses, place_weights, plane_significance, pooled_prior, region_factor,
+    place_from_stock, place_masses, place_weights, plane_significance, pooled_prior, read_runs, region_factor,
     repeated_readings, robust_fit, severity_zone, shapes_at, spread_of_corrections, stored_prior,
     suggest_run, torque_cycle, transfer_to_planes, trial_effect, trial_unbalance, unseen_combination
 

@@ -32,6 +32,7 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
+        ("runs",),
         ("log_picture",),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (

@@ -199,9 +199,9 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
 
 
 def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
+    from balancing.runs.runs import latest
     from cli.field.remarks import sense, warnings
     from cli.field.rotor import each, way
-    from cli.read.runs.runs import latest
     from cli.show.result import Result
 
     remarks, day = warnings(b), latest(b.runs.table)

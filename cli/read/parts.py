@@ -97,8 +97,8 @@ class _Unturned:
 
     def exact(self) -> Body:
         """Return the parts, turned, to 32 digits: from the decimals of the table as they are written."""
-        from cli.read.exact import column, cosine_and_sine
         from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.tables.exact import column, cosine_and_sine
 
         read, shape = self.table.numbers, np.array(self.shapes)
         cells = {name: column(numbers, self.index) for name, numbers in read.items()}

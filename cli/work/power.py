@@ -166,8 +166,8 @@ class WorkBalance:
     @cached_property
     def second(self) -> list[tuple[LinkStates, Again]]:
         """The states of each group and what balances them in 32 digits, of the decimals of the table as they are written."""
-        from cli.read.exact import plain
         from dalembert.arithmetic.doubled_arrays import DoubledComplex
+        from dalembert.tables.exact import plain
 
         groups = []
         for (members, rows), (_, solved) in zip(self.places, self.groups, strict=True):
@@ -190,8 +190,8 @@ class WorkBalance:
 
     def exact_unknowns(self) -> Doubled:
         """The load of each cell of all unknowns in 32 digits, (cells,)."""
-        from cli.read.exact import plain
         from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.tables.exact import plain
 
         values: list[Any] = [again.value for _, again in self.second]
         cells = [
