@@ -32,7 +32,7 @@ Bodies (`rigidbody3d`):
     Body, BodyMotion, FreeBody, FreeState, SHAPES, Shaft, Top, TopState, Trajectory, Wrench,
     check_inertia, compose_body, from_scipy, gyroscopic_couple, inertia_of, inertia_tensor,
     integrate_rotation, load_mesh, measure_of, mesh_properties, parallel_axis_shift, principal_axes,
-    products_of_inertia, rolling_cones, sleeping_threshold, steady_precession, strike_body, to_scipy
+    products_of_inertia, read_parts, rolling_cones, sleeping_threshold, steady_precession, strike_body, to_scipy
 """
 
 from __future__ import annotations

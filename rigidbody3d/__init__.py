@@ -4,6 +4,8 @@ SI units and radians; leading axes of an array are bodies, states or times. Quat
 to space. Products of inertia are +∫ x y dm, and a tensor carries them with the minus sign.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from rigidbody3d.attitude import from_scipy, to_scipy
 from rigidbody3d.body import Body, compose
 from rigidbody3d.freebody import FreeBody, FreeState
@@ -15,6 +17,9 @@ from rigidbody3d.percussion import strike
 from rigidbody3d.shaft import Shaft
 from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
 from rigidbody3d.top import Top, TopState
+
+if TYPE_CHECKING:
+    from rigidbody3d.parts import read_parts
 
 __all__ = [
     "SHAPES",
@@ -39,6 +44,7 @@ __all__ = [
     "mesh",
     "principal",
     "products",
+    "read_parts",
     "shift",
     "sleeping_threshold",
     "steady_precession",
@@ -46,3 +52,12 @@ __all__ = [
     "tensor",
     "to_scipy",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # a body of numbers waits for no reader of tables
+    if name != "read_parts":
+        raise AttributeError(f"module 'rigidbody3d' has no attribute '{name}'")
+    from rigidbody3d.parts import read_parts
+
+    return read_parts

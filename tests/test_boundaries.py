@@ -88,12 +88,13 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
+        ("parts",),
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
         ("solids",),
         ("inertia",),
-        ("attitude", "eigenvectors", "elliptic", "shapes", "splitting", "top_roots"),
+        ("attitude", "eigenvectors", "elliptic", "shapes", "splitting", "top_roots", "turning"),
     ),
     "cli": (
         ("__main__",),

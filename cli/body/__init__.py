@@ -60,9 +60,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
-    from cli.read.parts import read_bodies, read_table
     from cli.read.root_search import pair
     from cli.show.result import Result, with_found
+    from rigidbody3d.parts import read_bodies, read_table
 
     request = Request(
         omega=vector("--omega", options.omega, "speed"),

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.read.parts import Parts
 from cli.read.rotor_options import Planes
 from dalembert.angles import degrees
 from rigidbody3d import Body, Motion, Shaft
+from rigidbody3d.parts import Parts
 from rigidbody3d.shaft import shaft_axes
 
 if TYPE_CHECKING:

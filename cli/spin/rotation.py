@@ -176,7 +176,7 @@ def _of_parts(
     """Return the tensor of a table of parts, the same to 32 digits, and warnings."""
     if not isinstance(named, str):
         raise DataError(f"{file}: parts: found {toml_text(named)}, expected the name of a CSV file")
-    from cli.read.parts import read_parts
+    from rigidbody3d.parts import read_parts
 
     parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
     warnings = list(parts.warnings)
