@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
-_VECTOR = "X,Y,Z"
-
 
 OPTIONS = """
 Arguments:

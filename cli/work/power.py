@@ -405,9 +405,9 @@ def _entry(
 ) -> Entry:
     """A force at a velocity, or a torque, a plain number, at an angular velocity."""
     if isinstance(load, float) and isinstance(rate, float):
-        why = why_not(load, rate, works, fastest[1])
+        why = why_not(rate, works, fastest[1])
         return Entry(link, kind, torque=load, omega=rate, power=power, workless=why, field=field)
-    why = why_not(load, rate, works, fastest[0])
+    why = why_not(rate, works, fastest[0])
     return Entry(link, kind, complex(load), complex(rate), power=power, workless=why, field=field)
 
 
