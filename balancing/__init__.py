@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, initial_alone, joint_fit
+    from balancing.runs import read_runs
     from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import (
         GRADES,
@@ -64,6 +65,7 @@ _HOMES = {
     "balancing.flywheel": "TorqueCycle torque_cycle",
     "balancing.indexing": "Indexed index_balancing",
     "balancing.influence": "influence_coefficients",
+    "balancing.runs": "read_runs",
     "balancing.run_log": "JointFit Undetermined determined initial_alone joint_fit",
     "balancing.limited": "Infeasible NotConverged",
     "balancing.modal": "ModalCorrection UnreachedMode modal_corrections shapes_at",
@@ -154,6 +156,7 @@ __all__ = [
     "place_weights",
     "plane_significance",
     "pooled_prior",
+    "read_runs",
     "region_factor",
     "repeats",
     "robust_fit",

@@ -8,9 +8,11 @@ from collections.abc import Iterator
 import typer
 from typer.core import TyperGroup
 
-from cli.app import COMMANDS, build
+from cli import COMMANDS
+from cli.app import build
 from cli.examples import describe
-from cli.show.commands import SHARED, Command, help_lines
+from cli.show.commands import SHARED, help_lines
+from cli.show.help import Command
 
 _HEAD = """# Commands and options
 

@@ -7,75 +7,14 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from importlib import import_module
 from io import TextIOWrapper
 
 import typer
 from typer.core import TyperGroup
 
-from cli import COMPLETE, completed_words
+from cli import COMMANDS, COMPLETE, GROUPS, completed_words, function_of
 from dalembert.arithmetic.choice import EngineError, wanted
 from dalembert.errors import DataError, one_line
-
-# heading -> name -> (module with a function `run`, the line shown by `dalembert --help`)
-GROUPS = {
-    "Rotors": {
-        "balance": ("cli.balance", "Balance rotors from a table of known eccentric masses."),
-        "field": ("cli.field", "Balance rotors from measured vibration and trial masses."),
-        "trial": ("cli.trial", "Suggest a trial mass for the first run in the field."),
-        "signal": ("cli.signal", "Compute amplitude and phase of a recorded vibration."),
-        "place": (
-            "cli.place",
-            "Put a correction where masses can go: holes, blades, weights in stock.",
-        ),
-        "index": ("cli.index", "Separate a rotor's unbalance from its mandrel's: index balancing."),
-        "engine": ("cli.engine", "Compute the shaking forces and couples of an engine."),
-        "flywheel": ("cli.flywheel", "Size the flywheel of a shaft from a table of its torque."),
-    },
-    "Mechanisms": {
-        "mechanism": ("cli.mechanism", "Solve the poses: positions, velocities, accelerations."),
-        "forces": (
-            "cli.forces",
-            "Compute the effort at the inputs, joint forces, the shaking force.",
-        ),
-        "inspect": (
-            "cli.inspect",
-            "Inspect mobility, Grashof classes, limits, dead and change points, strokes.",
-        ),
-        "equilibrium": (
-            "cli.equilibrium",
-            "Find the positions of rest, their stability and periods of oscillation.",
-        ),
-        "simulate": ("cli.simulate", "Simulate the motion in time under the loads."),
-        "tolerance": ("cli.tolerance", "Compute the effect of the tolerances of dimensions."),
-        "fit": ("cli.fit", "Fit dimensions to a target."),
-        "work": ("cli.work", "Find the load that balances a table of link states, by virtual work."),
-    },
-    "Bodies": {
-        "body": ("cli.body", "Compute inertia, angular momentum and shaft reactions of a body."),
-        "spin": ("cli.spin", "Compute the rotation of a body in time: free, under gravity, under a torque."),
-    },
-    "Teaching": {
-        "exercise": (
-            "cli.exercise",
-            "Make the variants of an exercise: sheets, key, solutions, questions.",
-        ),
-        "grade": ("cli.grade", "Mark the answers to an exercise, and name likely mistakes."),
-    },
-    "Files": {
-        "import": ("cli.formats", "Import a mechanism drawn in another program."),
-        "export": (
-            "cli.formats.export_command",
-            "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
-        ),
-        "examples": (
-            "cli.examples",
-            "List the worked examples, or write one into the current folder.",
-        ),
-        "completion": ("cli.completion", "Print the completion script for bash, zsh or fish."),
-    },
-}
-COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
 
 
 class Front(TyperGroup):
@@ -136,18 +75,17 @@ def build(called: str | None) -> typer.Typer:
     )
     app.callback()(_front)
     for name in names:
-        module, line = COMMANDS[name]
+        _, line = COMMANDS[name]
         if name == called:
             # the front door's own help is shown without it
-            from cli.show.commands import with_help
+            from cli.show.help import with_help
 
-            file = import_module(module)
+            function = function_of(name)
             if COMPLETE in os.environ:
                 from cli.completion import complete
 
-                complete(file.run, name)
-            kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""), _call_of)
-            app.command(name, short_help=line, cls=kind)(file.run)
+                complete(function, name)
+            app.command(name, short_help=line, cls=with_help(function, _call_of))(function)
         else:
             app.command(name, short_help=line)(_elsewhere)
     return app

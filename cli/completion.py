@@ -123,7 +123,7 @@ def _quantities(ctx: typer.Context) -> list[str]:
 
 def _targets(_: typer.Context) -> list[str]:
     """The names that --want takes."""
-    from cli.fit.targets import every_wanted
+    from cli.mechanism.targets import every_wanted
 
     return [name for each in every_wanted(_mechanism()) for name in each.names]
 

@@ -213,7 +213,7 @@ def _exact(
     """The recording in 32 digits, as `OncePerTurn.second_run` takes it; `names` of time, mark and tacho."""
     import numpy as np
 
-    from cli.read.exact import long_column
+    from dalembert.tables.exact import long_column
 
     t, mark, tacho = (None if name is None else table.numbers[name] for name in names)
     assert t is not None

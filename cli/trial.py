@@ -45,8 +45,8 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
         from balancing.trial import load_rule
 
         def exact() -> Doubled:
-            from cli.read.exact import quantity, written
             from dalembert.arithmetic.doubled import Doubled
+            from dalembert.tables.exact import quantity, written
 
             numbers = (
                 quantity(options.rotor_mass, "mass"),
@@ -57,7 +57,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
             return result
 
         def mass_exact() -> Doubled:
-            from cli.read.exact import quantity
+            from dalembert.tables.exact import quantity
 
             return exact() / quantity(options.radius, "length")
 

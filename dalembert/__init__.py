@@ -17,7 +17,7 @@ Rotors (`balancing`):
     influence_coefficients, influence_error, influence_from_amplitudes, initial_alone,
     initial_unbalance, joint_fit, journal_loads, least_squares, mil_unbalance, minimax,
     modal_corrections, once_per_turn, outlier_probability, permissible_unbalance, phase_sense,
-    place_from_stock, place_masses, place_weights, plane_significance, pooled_prior, region_factor,
+    place_from_stock, place_masses, place_weights, plane_significance, pooled_prior, read_runs, region_factor,
     repeated_readings, robust_fit, severity_zone, shapes_at, spread_of_corrections, stored_prior,
     suggest_run, torque_cycle, transfer_to_planes, trial_effect, trial_unbalance, unseen_combination
 
@@ -32,7 +32,7 @@ Bodies (`rigidbody3d`):
     Body, BodyMotion, FreeBody, FreeState, SHAPES, Shaft, Top, TopState, Trajectory, Wrench,
     check_inertia, compose_body, from_scipy, gyroscopic_couple, inertia_of, inertia_tensor,
     integrate_rotation, load_mesh, measure_of, mesh_properties, parallel_axis_shift, principal_axes,
-    products_of_inertia, rolling_cones, sleeping_threshold, steady_precession, strike_body, to_scipy
+    products_of_inertia, read_parts, rolling_cones, sleeping_threshold, steady_precession, strike_body, to_scipy
 """
 
 from __future__ import annotations

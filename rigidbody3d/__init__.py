@@ -4,17 +4,53 @@ SI units and radians; leading axes of an array are bodies, states or times. Quat
 to space. Products of inertia are +∫ x y dm, and a tensor carries them with the minus sign.
 """
 
-from rigidbody3d.attitude import from_scipy, to_scipy
-from rigidbody3d.body import Body, compose
-from rigidbody3d.freebody import FreeBody, FreeState
-from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, steady_precession
-from rigidbody3d.inertia import check, principal, products, shift, tensor
-from rigidbody3d.integration import Trajectory, integrate
-from rigidbody3d.momentum import Motion, Wrench
-from rigidbody3d.percussion import strike
-from rigidbody3d.shaft import Shaft
-from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
-from rigidbody3d.top import Top, TopState
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigidbody3d.attitude import from_scipy, to_scipy
+    from rigidbody3d.body import Body, compose
+    from rigidbody3d.freebody import FreeBody, FreeState
+    from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, steady_precession
+    from rigidbody3d.inertia import check, principal, products, shift, tensor
+    from rigidbody3d.integration import Trajectory, integrate
+    from rigidbody3d.momentum import Motion, Wrench
+    from rigidbody3d.parts import read_parts
+    from rigidbody3d.percussion import strike
+    from rigidbody3d.shaft import Shaft
+    from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
+    from rigidbody3d.top import Top, TopState
+
+# each module is loaded when one of its names is used: inertia waits for no rotation in time, and numbers for no table
+_HOMES = {
+    "rigidbody3d.attitude": "from_scipy to_scipy",
+    "rigidbody3d.body": "Body compose",
+    "rigidbody3d.freebody": "FreeBody FreeState",
+    "rigidbody3d.gyroscope": "cones gyroscopic_couple sleeping_threshold steady_precession",
+    "rigidbody3d.inertia": "check principal products shift tensor",
+    "rigidbody3d.integration": "Trajectory integrate",
+    "rigidbody3d.momentum": "Motion Wrench",
+    "rigidbody3d.parts": "read_parts",
+    "rigidbody3d.percussion": "strike",
+    "rigidbody3d.shaft": "Shaft",
+    "rigidbody3d.shapes": "SHAPES inertia_of load_mesh measure_of mesh",
+    "rigidbody3d.top": "Top TopState",
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'rigidbody3d' has no attribute '{name}'")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})
+
 
 __all__ = [
     "SHAPES",
@@ -39,6 +75,7 @@ __all__ = [
     "mesh",
     "principal",
     "products",
+    "read_parts",
     "shift",
     "sleeping_threshold",
     "steady_precession",

@@ -32,6 +32,7 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
+        ("runs",),
         ("log_picture",),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (
@@ -87,12 +88,13 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
+        ("parts",),
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
         ("solids",),
         ("inertia",),
-        ("attitude", "eigenvectors", "elliptic", "shapes", "splitting", "top_roots"),
+        ("attitude", "eigenvectors", "elliptic", "shapes", "splitting", "top_roots", "turning"),
     ),
     "cli": (
         ("__main__",),
@@ -103,21 +105,15 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         (
             "balance",
             "body",
-            "equilibrium",
             "engine",
             "examples",
             "field",
-            "fit",
-            "forces",
-            "inspect",
             "flywheel",
             "index",
             "mechanism",
             "place",
             "signal",
-            "simulate",
             "spin",
-            "tolerance",
             "trial",
             "work",
         ),
@@ -125,7 +121,6 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("cases",),
         ("show",),
         ("read",),
-        ("renamed",),
         ("__init__",),
     ),
     "dalembert": (

@@ -6,11 +6,9 @@ import functools
 import os
 import shlex
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
-import typer
 
 from benchmarks.fuzz.damage import TOKENS, damage
 from cli.examples import ABOUT, EXAMPLES, describe, names
@@ -192,11 +190,9 @@ def _files(example: str) -> dict[str, bytes]:
 @functools.cache
 def _options(command: str) -> tuple[tuple[str, bool], ...]:
     """Every option of a command: its longest name, and whether it is a flag."""
-    from cli.app import COMMANDS
+    from cli.show.output import parser_of
 
-    app = typer.Typer(add_completion=False)
-    app.command(command)(import_module(COMMANDS[command][0]).run)
-    parsed: Any = typer.main.get_command(app)
+    parsed = parser_of(command)
     return tuple(
         (max(p.opts, key=len), bool(p.is_flag)) for p in parsed.params if p.param_type_name == "option"
     )

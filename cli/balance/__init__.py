@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from dalembert.results.way import Topic
 
 
-EXAMPLE = "riul-rotor"
 OPTIONS = """
 Arguments:
   table TABLE  CSV of eccentric masses; - is standard input.
@@ -57,7 +56,7 @@ Further options (docs/commands.md describes them):
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="riul-rotor")
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 

@@ -57,7 +57,7 @@ class Rotors:
 
     def exact(self, gravity: float) -> Vectors:
         """The unbalances of the decimals of the file, in 32 digits."""
-        from cli.read.exact import vectors, written
+        from dalembert.tables.exact import vectors, written
 
         read = self.table.numbers
         amount = next(read[name] for name in ("mass", "weight", "unbalance") if name in read)
@@ -368,9 +368,9 @@ class Balancing:
         from fractions import Fraction
 
         from balancing.second_run import ExactMasses, least_norm
-        from cli.read.exact import writtens
         from dalembert.arithmetic.doubled import Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+        from dalembert.tables.exact import writtens
 
         rotors, none = self.rotors, Doubled(np.zeros(1))
         # behind the masses nothing, which index -1 means

@@ -93,7 +93,7 @@ def corrections(b: Balancing) -> Table:
         """The errors of unbalances over an arm, times g, as they are before they are rounded to a step."""
 
         def exact() -> Doubled:
-            from cli.read.exact import writtens
+            from dalembert.tables.exact import writtens
 
             return b.exact.size / writtens(arm) * writtens(g)
 
@@ -136,7 +136,7 @@ def _arms(radius: Real, mass_unit: str, unit: str) -> Real:
     """Return what takes masses in a unit to unbalances in another, by radii in m as they are written: 20 for g and g·mm at 20 mm."""
     from fractions import Fraction
 
-    from cli.read.exact import written
+    from dalembert.tables.exact import written
 
     (a, b), (c, d) = UNITS["mass"][mass_unit], UNITS["unbalance"][unit]
     scale = Fraction(a) / Fraction(b) * Fraction(d) / Fraction(c)

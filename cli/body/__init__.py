@@ -16,10 +16,7 @@ if TYPE_CHECKING:
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
-_VECTOR = "X,Y,Z"
 
-
-EXAMPLE = "riul-rod"
 OPTIONS = """
 Arguments:
   parts PARTS  CSV of parts; - is standard input.
@@ -47,7 +44,7 @@ Further options (docs/commands.md describes them):
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="riul-rod")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the forces and
     moments of its motion.
@@ -61,9 +58,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
-    from cli.read.parts import read_bodies, read_table
     from cli.read.root_search import pair
     from cli.show.result import Result, with_found
+    from rigidbody3d.parts import read_bodies, read_table
 
     request = Request(
         omega=vector("--omega", options.omega, "speed"),

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.read.parts import Parts
 from cli.read.rotor_options import Planes
 from dalembert.angles import degrees
 from rigidbody3d import Body, Motion, Shaft
+from rigidbody3d.parts import Parts
 from rigidbody3d.shaft import shaft_axes
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class MovingBody:
         """Numbers of an option."""
         if not self.doubled:
             return np.asarray(option, dtype=float)
-        from cli.read.exact import array
+        from dalembert.tables.exact import array
 
         result: Any = array(option)
         return result  # type: ignore[no-any-return]
@@ -101,7 +101,7 @@ class MovingBody:
         """Angular velocities and accelerations of an option."""
         if not self.doubled:
             return np.asarray(option, dtype=float)
-        from cli.read.exact import rates
+        from dalembert.tables.exact import rates
 
         result: Any = rates(option)
         return result  # type: ignore[no-any-return]
@@ -237,8 +237,8 @@ class MovingBody:
     def exact_correction(self) -> Vectors:
         """The corrections to 32 digits, (p,)."""
         from balancing.second_run import ExactMasses
-        from cli.read.exact import writtens
         from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.tables.exact import writtens
 
         shaft: Any = self.second.shaft
         x, y = (shaft.unbalance_xy[..., i].doubled for i in range(2))
@@ -247,8 +247,8 @@ class MovingBody:
     @cached_property
     def correction_errors(self) -> list[CorrectionMass]:
         """The errors of the masses of the correction planes."""
-        from cli.read.exact import writtens
         from dalembert.arithmetic.doubled_vectors import off
+        from dalembert.tables.exact import writtens
 
         fix, exact = self.correction, self.exact_correction
         assert fix is not None

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cli.body.moving import AXES, CorrectionMass, MovingBody
-from cli.read.parts import SEVERAL
 from cli.show.picture import blank
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, document_unit, names, number, stacked
 from dalembert.units import G0
+from rigidbody3d.parts import SEVERAL
 from rigidbody3d.picture import views
 
 if TYPE_CHECKING:

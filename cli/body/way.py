@@ -13,11 +13,11 @@ from cli.body.moving import AXES, ORIGIN, MovingBody, Request
 from cli.body.tables import axis_words, numbers_of
 from cli.read import root_search
 from cli.read.options import bad
-from cli.read.parts import SEVERAL, bodies_of
 from dalembert.results.columns import Column, Table, listed, names, number, vector
 from dalembert.results.way import Topic, figures
 from dalembert.tables.table import Table as ReadTable
 from rigidbody3d.inertia import free_axes, own_axes, shift
+from rigidbody3d.parts import SEVERAL, bodies_of
 
 if TYPE_CHECKING:
     from cli.body.moving import Array

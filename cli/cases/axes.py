@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.cases.inputs import Axis, Driven, Grid, Varied, with_numbers
-from cli.cases.written import DEGREES, ROWS, Range, Written
 from cli.read import options
+from cli.read.written import DEGREES, ROWS, Range, Written
 from dalembert.decimals import Factor
 from dalembert.errors import DataError
 from dalembert.hints import nearest
@@ -289,7 +289,7 @@ def _shown_and_si(column: Numbers) -> tuple[Reals, Reals]:
     if column.unit == "deg":
         return column.values, np.radians(column.values)
     if column.dimension == "angle":
-        from cli.read.exact import as_written
+        from dalembert.tables.exact import as_written
 
         return as_written(column).value, column.si
     return column.si, column.si
@@ -297,7 +297,7 @@ def _shown_and_si(column: Numbers) -> tuple[Reals, Reals]:
 
 def _rest_of_columns(columns: Sequence[Numbers]) -> Reals:
     """Return the exact numbers of columns less their floats, SI, (n, columns)."""
-    from cli.read.exact import column
+    from dalembert.tables.exact import column
 
     each = range(len(columns[0].values))
     return np.array([(column(c, each) - _shown_and_si(c)[1]).value for c in columns]).T

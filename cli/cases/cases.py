@@ -16,8 +16,8 @@ import numpy as np
 from cli.cases.analysis import Analysis, Request
 from cli.cases.axes import assigned, grids
 from cli.cases.inputs import Axis, Driven, Grid, Varied, of_one, with_numbers
-from cli.cases.written import written
 from cli.read.options import about, bad
+from cli.read.written import written
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.tables.files import name_of, note, read_bytes, remember, split_sheet

@@ -10,9 +10,9 @@ from cli.cases.analysis import Analysis
 from cli.cases.axes import dimension_named, place_or_angle
 from cli.cases.inputs import of_one, with_numbers
 from cli.cases.poses import cells_of, column, keys_of, solved
-from cli.cases.written import DEGREES, Written
 from cli.read import root_search
 from cli.read.options import bad
+from cli.read.written import DEGREES, Written
 from dalembert.dataclass import replace
 from dalembert.errors import DataError
 from dalembert.units import UNITS, from_si, written

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.cases.written import ROWS, Range, Written
+from cli.read.written import ROWS, Range, Written
 from dalembert.angles import read_degrees
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.units import UNITS

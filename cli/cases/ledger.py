@@ -65,10 +65,10 @@ class Entry(NamedTuple):
         return f"{self.symbol}·{self.rate} = {product} = {figures(self.power)} W"
 
 
-def why_not(load: complex | float, rate: complex | float, works: bool, fastest: float) -> str | None:
+def why_not(rate: complex | float, works: bool, fastest: float) -> str | None:
     """Return why a load does no work; None where it does.
 
-    >>> why_not(-30j, 5 + 0j, False, 5.0), why_not(-30j, 0j, False, 5.0), why_not(2.0, 3.0, True, 3.0)
+    >>> why_not(5 + 0j, False, 5.0), why_not(0j, False, 5.0), why_not(3.0, True, 3.0)
     ('perpendicular to the displacement', 'at rest', None)
     """
     if works:

@@ -304,7 +304,7 @@ def documents(analysis: Analysis) -> list[Document]:
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         computed, whole = solved(motion, keys), analysis.assembled(motion)
         condition = motion.condition if analysis.request.only is None else None
-        marks = marks_of(analysis, motion)
+        marks = marks_of(motion)
         listed.append(poses_of(analysis, assembly.number, computed, whole, condition, marks))
     return [pose for each in zip(*listed, strict=True) for pose in each]
 
@@ -359,7 +359,7 @@ def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
     return {"poses": [{**pose_head(analysis, i), **entry} for i, entry in enumerate(entries)]}
 
 
-def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
+def marks_of(motion: Motion) -> list[list[str]]:
     """Return the marks of each pose: a change point, a limit of the input, a dead point."""
     result: list[list[str]] = [[] for _ in range(motion.n)]
     track = motion.assembly.track

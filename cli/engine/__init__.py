@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "inline-four"
 OPTIONS = """
 Arguments:
   cylinders CYLINDERS  CSV with a row for each cylinder; - is standard input.
@@ -28,7 +27,7 @@ Counterweights and balance shafts:
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="inline-four")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute the shaking forces and couples of an engine by exact orders, and the residuals after counterweights and
     balance shafts.

@@ -57,7 +57,7 @@ class Cylinders:
     @property
     def in_32_digits(self) -> Cylinders:
         """The cylinders in 32 digits, with the decimals of the table exact."""
-        from cli.read.exact import as_written
+        from dalembert.tables.exact import as_written
 
         numbers: dict[str, Any] = {
             name: as_written(self.table.numbers[name])
@@ -189,7 +189,7 @@ class Engine:
     @cached_property
     def second(self) -> Engine:
         """The engine in 32 digits, with the decimals of the table and of the options exact."""
-        from cli.read.exact import array, rates
+        from dalembert.tables.exact import array, rates
 
         numbers: dict[str, Any] = {
             "cylinders": self.cylinders.in_32_digits,

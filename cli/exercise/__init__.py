@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "exercise-rotor"
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
@@ -46,7 +45,7 @@ def _show(result: Result, show_options: ShowOptions, call: object) -> None:
     typer.echo(result.notes(), nl=False)
 
 
-@with_options(OPTIONS, ("json", "expect", "rtol"), _show)
+@with_options(OPTIONS, ("json", "expect", "rtol"), _show, example="exercise-rotor")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
 

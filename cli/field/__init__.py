@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Column
 
 
-EXAMPLE = "fan-one-plane"
 METHOD = (
     "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
     "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
@@ -84,7 +83,7 @@ Further options (docs/commands.md describes them):
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="fan-one-plane")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -200,9 +199,9 @@ def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
 
 
 def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
+    from balancing.runs.runs import latest
     from cli.field.remarks import sense, warnings
     from cli.field.rotor import each, way
-    from cli.read.runs.runs import latest
     from cli.show.result import Result
 
     remarks, day = warnings(b), latest(b.runs.table)

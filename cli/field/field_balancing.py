@@ -27,10 +27,10 @@ from balancing import (
 )
 from balancing.dependence import directions
 from balancing.objective import Objective
+from balancing.runs.runs import SHOWN, Complex, Group, Real, Runs
+from balancing.runs.stored import Stored
 from cli.field.fit import Request
 from cli.read.options import bad, mass_at
-from cli.read.runs.runs import SHOWN, Complex, Group, Real, Runs
-from cli.read.stored import Stored
 from dalembert.angles import degrees, in_turn, phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.parts import in_parts

@@ -19,12 +19,12 @@ from balancing import (
     joint_fit,
     phase_sense,
 )
+from balancing.runs.reading import Measured, read_measured
+from balancing.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
+from balancing.runs.stored import Stored, read_runout
 from cli.read import options
 from cli.read.rotor_options import Tolerance
-from cli.read.runs.reading import Measured, read_measured
-from cli.read.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
-from cli.read.stored import Stored, read_runout
-from dalembert.errors import DataError
+from dalembert.errors import DataError, quote
 
 if TYPE_CHECKING:
     from balancing.log_again import ExactErrors, ExactFit
@@ -93,6 +93,9 @@ def measured_groups(
         against=request.against,
     )
     runs, stored = measured.rows.rows.of, measured.stored
+    for name in request.exclude:
+        if name not in measured.rows.rows.runs:
+            raise options.bad("--exclude", f"no run {quote(name)} in {runs.table.file}")
     runs.groups = list(_Groups(measured, request).fitted())
     # the one fact that shows a fit: it is requested, or there are readings to spare, or no run is without masses
     runs.fitted = not request.four_run and (measured.fit or any(_spares(group) for group in runs.groups))
@@ -377,7 +380,7 @@ def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
 
 def _as_stated(errors: tuple[float, float]) -> tuple[Doubled, Doubled]:
     """Return the standard deviations that --reading-error states, as written: relative (amplitude), and in rad (phase)."""
-    from cli.read.exact import rates, writtens
+    from dalembert.tables.exact import rates, writtens
 
     return writtens(errors[0]), rates(errors[1]).doubled
 

@@ -17,11 +17,11 @@ from balancing import (
 )
 from balancing.doubt import LEVEL
 from balancing.log_balance import CoefficientSpread
+from balancing.runs.runs import Before, Complex, Real
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor, each
 from cli.field.tables import READINGS, Rows, amplitude, masses, masses_text, vibration
 from cli.read.options import bad
-from cli.read.runs.runs import Before, Complex, Real
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.units import amplitude_kind, from_si, to_si

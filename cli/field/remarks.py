@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from balancing import plane_significance, trial_effect
 from balancing.doubt import LEVEL
+from balancing.runs.runs import SHOWN
 from balancing.weights import ENOUGH
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor
-from cli.read.runs.runs import SHOWN
 from dalembert.angles import degrees
 
 NEARLY = 0.1  # a plane whose effect others bring about but for this share counts as nearly dependent

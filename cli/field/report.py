@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.picture import Vibration, vibration
+from balancing.runs.runs import Complex
 from cli.field.field_balancing import FieldBalancing
 from cli.field.fit_tables import predicted, reverse, spread, suggested
 from cli.field.remarks import instrument, sense
@@ -17,7 +18,6 @@ from cli.field.rotor import Rotor, each
 from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
 from cli.read.options import bad
 from cli.read.rotor_options import verdict_table
-from cli.read.runs.runs import Complex
 from cli.show.picture import blank
 from cli.show.result import Bar, Bars, Section, Sheet
 from dalembert.angles import degrees

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import initial_unbalance
+from balancing.runs.runs import Channel, Complex, Group, Real
 from cli.field.field_balancing import SINGULAR, FieldBalancing, Solved
 from cli.read.rotor_options import Verdict
-from cli.read.runs.runs import Channel, Complex, Group, Real
 from dalembert.angles import degrees
 from dalembert.arithmetic.exact import EPS
 from dalembert.results.columns import Column, Table, finite, listed, names

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing import Balance
+from balancing.runs.runs import Channel, Complex, Real
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.fit import exact_errors, exact_fit
 from cli.field.remarks import conventions
 from cli.field.rotor import Rotor, Trim, each
-from cli.read.runs.runs import Channel, Complex, Real
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.text import angle_text
@@ -250,7 +250,7 @@ class SecondRun:
     @property
     def ridge(self) -> Doubled:
         """That of the option, as it is written."""
-        from cli.read.exact import writtens
+        from dalembert.tables.exact import writtens
 
         return writtens(self.solved.objective.ridge)
 

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "flywheel-engine"
 OPTIONS = """
 Arguments:
   table TABLE  CSV of torque over whole turns of the shaft; - is standard input.
@@ -40,7 +39,7 @@ def coefficient(text: str) -> float:
     return value
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="flywheel-engine")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Find the flywheel that keeps the speed of a shaft within a fluctuation, from a table of its torque.
 

@@ -50,7 +50,7 @@ class Flywheel:
     @cached_property
     def second(self) -> Flywheel:
         """The flywheel in 32 digits, with the decimals of the table and of the options exact."""
-        from cli.read.exact import array, as_written, rates
+        from dalembert.tables.exact import array, as_written, rates
 
         angle, torque = (self.table.numbers[name] for name in ("angle", "torque"))
         exact: dict[str, Any] = {

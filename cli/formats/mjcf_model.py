@@ -26,8 +26,8 @@ from cli.formats.robot import (
     printed,
     rotation,
 )
-from cli.read.turning import along, turned
 from dalembert.errors import DataError
+from rigidbody3d.turning import along, turned
 
 if TYPE_CHECKING:
     from rigidbody3d.body import Body

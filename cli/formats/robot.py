@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from cli.formats.markup import At
 from cli.formats.values import MOST_LINKS, check_count
-from cli.read.turning import turned
 from dalembert.errors import DataError
 from dalembert.figures import last_place
+from rigidbody3d.turning import turned
 
 if TYPE_CHECKING:
     from virtualwork.describe.meshes import Gear

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "exercise-slider-crank"
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
@@ -23,7 +22,9 @@ What:
 """
 
 
-@with_options(OPTIONS, ("json", "output", "text", "report", "about", "no_color"), show)
+@with_options(
+    OPTIONS, ("json", "output", "text", "report", "about", "no_color"), show, example="exercise-slider-crank"
+)
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
 

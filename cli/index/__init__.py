@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "index-mandrel"
 OPTIONS = """
 Arguments:
   readings READINGS  CSV with a row for each position of the rotor on its mandrel; - is standard input.
@@ -22,7 +21,7 @@ What:
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="index-mandrel")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Separate a rotor's unbalance from its mandrel's: index balancing, by least squares over all positions.
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing import index_balancing
 from balancing.indexing import Indexed
-from cli.read.runs.vectors import parted_cells
+from balancing.runs.vectors import parted_cells
 from dalembert.angles import degrees, phasor
 from dalembert.decimals import Scaled
 from dalembert.errors import DataError, quote
@@ -50,7 +50,7 @@ class Positions:
     def exact(self) -> ExactParts:
         """The parts in 32 digits, with the decimals of the file exact."""
         from balancing.second_run import ExactParts
-        from cli.read.exact import turns, vectors
+        from dalembert.tables.exact import turns, vectors
 
         numbers = self.table.numbers
         size, angle = numbers[self.quantity], numbers["angle" if self.quantity == "unbalance" else "phase"]

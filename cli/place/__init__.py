@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from dalembert.results.way import Topic
 
 
-EXAMPLE = "blades"
 FIRST, FLAT = "0deg", "180deg"
 """Default angle of the first blade, default point angle of the drill."""
 OPTIONS = """
@@ -52,7 +51,7 @@ Further options (docs/commands.md describes them):
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="blades")
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
 

@@ -170,8 +170,8 @@ class SecondRun:
     @cached_property
     def target(self) -> Vectors:
         """The sum of the corrections."""
-        from cli.read.exact import vectors
         from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.tables.exact import vectors
         from dalembert.tables.table import Numbers
 
         total = Vectors.of(np.zeros(()))
@@ -187,8 +187,8 @@ class SecondRun:
     def goals(self) -> list[Vectors]:
         """The correction of each plane."""
         from balancing.second_run import ExactMasses
-        from cli.read.exact import written, writtens
         from dalembert.arithmetic.doubled import Doubled
+        from dalembert.tables.exact import written, writtens
 
         request = self.request
         goal = self.target
@@ -223,9 +223,9 @@ class SecondRun:
 
     def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
         """Return the masses of a plane and their angles in degrees, (n,) each."""
-        from cli.read.exact import writtens
         from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+        from dalembert.tables.exact import writtens
 
         request = self.request
         if request.weights is not None:
@@ -244,9 +244,9 @@ class SecondRun:
 
 def _depth(mass: Doubled, drill: Drill) -> Doubled:
     """The depth of a hole in 32 digits."""
-    from cli.read.exact import written
     from dalembert.arithmetic.doubled import PI, Doubled
     from dalembert.arithmetic.doubled_arrays import DoubledArray
+    from dalembert.tables.exact import written
 
     def stated(x: float) -> Any:
         return DoubledArray.of(Doubled.of(written(x)))

@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import cache, wraps
-from inspect import Parameter, signature
+from functools import cache, cached_property
+from inspect import Parameter, Signature
 from pathlib import Path
-from textwrap import wrap
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
-from typer.core import TyperCommand
 
 from cli.read.options import HEAD, column_names
 
@@ -186,56 +184,88 @@ def help_lines(options: str) -> dict[str, HelpLine]:
     return result
 
 
+class Declared:
+    """A function as a command: its text declares its own options, and it takes some of the shared ones.
+
+    The parser reads the signature of the command that is called, and the text of its options is read then: a file may
+    declare several commands.
+    """
+
+    def __init__(
+        self,
+        find: Callable[[SimpleNamespace, ShowOptions], Result],
+        options: str,
+        shared: Collection[str],
+        present: Callable[[Result, ShowOptions, Mapping[str, str]], None],
+        eager: Mapping[str, Callable[[bool], None]] | None,
+        forms: Sequence[str],
+        example: str,
+    ) -> None:
+        """Take the function, and what `with_options` takes."""
+        self.find, self.options, self.shared, self.present = find, options, shared, present
+        self.eager, self.forms, self.example = eager, forms, example
+        self.__name__, self.__doc__, self.__module__ = find.__name__, find.__doc__, find.__module__
+        # each parameter has its own annotation
+        self.__annotations__: dict[str, object] = {}
+
+    @cached_property
+    def own(self) -> dict[str, Parameter]:
+        """The parameters of its own."""
+        return parameters(self.options, self.eager)
+
+    @cached_property
+    def common(self) -> dict[str, Parameter]:
+        """The shared parameters that it takes."""
+        common = {name: p for name, p in shared_parameters(*self.forms).items() if name in self.shared}
+        # a command may have a value of its own below --about, which is no KEY=TEXT
+        if "about" in self.own:
+            point, head = help_lines(self.options)["about"], help_lines(SHARED)["about"]
+            line = point._replace(help=f"{point.help} KEY=TEXT, {head.help[0].lower()}{head.help[1:]}")
+            info = typer.Option(*line.flags, metavar=line.metavar, help=line.help)
+            common["about"] = common["about"].replace(annotation=Annotated[list[str] | None, info])
+        return common
+
+    @cached_property
+    def __signature__(self) -> Signature:
+        own = (p for name, p in self.own.items() if name not in self.common)
+        return Signature([*own, *self.common.values()])
+
+    def __call__(self, **values: object) -> None:
+        """Run the function, and show its result."""
+        from dalembert.tables.headers import rename
+
+        show = ShowOptions(**{name: values.pop(name) for name in self.common})
+        if "about" in self.own:
+            texts = show.about or []
+            show.about = [text for text in texts if "=" in text]
+            values["about"] = next((text for text in reversed(texts) if "=" not in text), None)
+        if show.head and show.report is None:
+            raise typer.BadParameter("expected --report FILE too", param_hint="--about")
+        rename(column_names(show.column))
+        call = {
+            name.replace("_", " "): _typed(value)
+            for name, value in values.items()
+            if value != self.own[name].default and value is not None
+        }
+        result = self.find(SimpleNamespace(**values), show)
+        with result.within():
+            self.present(result, show, call)
+
+
 def with_options(
     options: str,
     shared: Collection[str],
     present: Callable[[Result, ShowOptions, Mapping[str, str]], None],
     eager: Mapping[str, Callable[[bool], None]] | None = None,
     forms: Sequence[str] = (),
-) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
+    example: str = "",
+) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Declared]:
     """Make a command of a function of its own options and of the shared ones; `present` shows its result.
 
     `options` declares its own, as `parameters` reads them; `shared` are those of the shared ones that it takes, `forms`
-    further suffixes of -o.
+    further suffixes of -o, `example` is the worked example with which its help ends.
     """
-    own = parameters(options, eager)
-    common = {name: p for name, p in shared_parameters(*forms).items() if name in shared}
-    # a command may have a value of its own below --about, which is no KEY=TEXT
-    two = "about" in own
-    if two:
-        point, head = help_lines(options)["about"], help_lines(SHARED)["about"]
-        line = point._replace(help=f"{point.help} KEY=TEXT, {head.help[0].lower()}{head.help[1:]}")
-        info = typer.Option(*line.flags, metavar=line.metavar, help=line.help)
-        common["about"] = common["about"].replace(annotation=Annotated[list[str] | None, info])
-
-    def made(find: Callable[[SimpleNamespace, ShowOptions], Result]) -> Callable[..., None]:
-        @wraps(find)
-        def run(**values: object) -> None:
-            from dalembert.tables.headers import rename
-
-            show = ShowOptions(**{name: values.pop(name) for name in common})
-            if two:
-                texts = show.about or []
-                show.about = [text for text in texts if "=" in text]
-                values["about"] = next((text for text in reversed(texts) if "=" not in text), None)
-            if show.head and show.report is None:
-                raise typer.BadParameter("expected --report FILE too", param_hint="--about")
-            rename(column_names(show.column))
-            call = {
-                name.replace("_", " "): _typed(value)
-                for name, value in values.items()
-                if value != own[name].default and value is not None
-            }
-            result = find(SimpleNamespace(**values), show)
-            with result.within():
-                present(result, show, call)
-
-        every = [*(p for name, p in own.items() if not (two and name == "about")), *common.values()]
-        run.__signature__ = signature(find).replace(parameters=every, return_annotation=None)  # type: ignore[attr-defined]
-        run.__annotations__ = {p.name: p.annotation for p in every}
-        return run
-
-    return made
+    return lambda find: Declared(find, options, shared, present, eager, forms, example)
 
 
 def _typed(value: object) -> str:
@@ -243,119 +273,6 @@ def _typed(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
-
-
-FURTHER = "Further options"
-"""What a heading begins with whose options the help names only; docs/commands.md describes them."""
-
-
-class Command(TyperCommand):
-    """A command whose help has the options below headings: what, how, output."""
-
-    lines: Mapping[str, HelpLine] = {}
-    example = ""
-    # the call that an example shows, by the example's name
-    call_of: Callable[[str], str]
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the words; an option of an older version is answered by one line that names the new one."""
-        try:
-            return super().parse_args(ctx, args)
-        except Exception as error:
-            if isinstance(error, typer.BadParameter):
-                error.message = in_plain_words(error.message)
-            # of a NoSuchOption the option
-            option = getattr(error, "option_name", None)
-            # one of its own lacks its value
-            if option is None or any(option in param.opts for param in self.get_params(ctx)):
-                raise
-            from cli.renamed import renamed
-
-            line = renamed(ctx.info_name or "", option)
-            if line is None:
-                raise
-            typer.echo(line, err=True)
-            raise typer.Exit(2) from None
-
-    def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return the words behind the command's name: arguments stand there as the help below calls them."""
-        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
-
-    def panels_of(self, ctx: Any, without: Collection[str] = ()) -> dict[str, list[tuple[str, str]]]:
-        """Return the rows of help below their headings, further options last; `without`: parameters to leave out."""
-        shared = help_lines(SHARED)
-        place = {name: line.heading for name, line in {**shared, **self.lines}.items()}
-        listed = (
-            "Arguments",
-            "Options",
-            *(line.heading for of in (self.lines, shared) for line in of.values()),
-        )
-        headings = sorted(listed, key=lambda heading: heading.startswith(FURTHER))
-        rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in headings}
-        for param in self.get_params(ctx):
-            if param.name in without:
-                continue
-            record = param.get_help_record(ctx)
-            if record is not None:
-                heading = "Arguments" if param.param_type_name == "argument" else "Options"
-                flags, words = record
-                # that a number counts goes without saying
-                words = _RANGE.sub(_span, _COUNTS.sub("", words))
-                rows[place.get(param.name or "", heading)].append((flags, words))
-        return {heading: records for heading, records in rows.items() if records}
-
-    def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
-        for heading, records in self.panels_of(ctx).items():
-            with formatter.section(heading):
-                if heading.startswith(FURTHER):
-                    lead = " " * formatter.current_indent
-                    text = ", ".join(flags for flags, _ in records)
-                    # names are not cut at their hyphens
-                    lines = wrap(text, formatter.width - len(lead), break_on_hyphens=False)
-                    formatter.write("".join(f"{lead}{line}\n" for line in lines))
-                else:
-                    formatter.write_dl(records)
-
-    def format_epilog(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
-        if self.example:
-            with formatter.section(f"Example (dalembert examples {self.example} writes its files here)"):
-                formatter.write(f"  {self.call_of(self.example)}\n")
-
-
-# the parser's own words for a value that is no number, or out of range
-_NO_NUMBER = re.compile(r"('.*') is not a valid (int|float)\w*(?: range)?\.?", re.DOTALL)
-_RANGE = re.compile(r"(?:(\d+)(?:\.0)?<=)?x([<>]=)(\d+)(?:\.0)?")
-_COUNTS = re.compile(r"  \[x>=[01](?:\.0)?\]|; x>=[01](?:\.0)?(?=\])")
-_OUTSIDE = re.compile(rf"(\S+) is not in the range ({_RANGE.pattern})\.?")
-
-
-def _span(match: re.Match[str]) -> str:
-    """A range of numbers, as help and messages say it."""
-    least, sign, bound = match.groups()
-    return f"from {least} to {bound}" if least else f"at {'least' if sign == '>=' else 'most'} {bound}"
-
-
-def in_plain_words(message: str) -> str:
-    """Return the parser's message about a value in the words of all other messages.
-
-    >>> in_plain_words("'abc' is not a valid int range."), in_plain_words("'abc' is not a valid float.")
-    ("'abc': expected a whole number", "'abc': expected a number")
-    >>> in_plain_words("-1 is not in the range x>=1."), in_plain_words("0 is not in the range 1<=x<=100.")
-    ('-1: expected a number, at least 1', '0: expected a number from 1 to 100')
-    """
-    if match := _NO_NUMBER.fullmatch(message):
-        return f"{match[1]}: expected a {'whole ' if match[2] == 'int' else ''}number"
-    if match := _OUTSIDE.fullmatch(message):
-        return f"{match[1]}: expected a number {_RANGE.sub(_span, match[2])}".replace(
-            "number at", "number, at"
-        )
-    return message
-
-
-def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type[Command]:
-    """Return the kind of command whose help says this of its options, and ends in this example's call."""
-    own = {"lines": help_lines(options), "example": example, "call_of": staticmethod(call_of)}
-    return type("Command", (Command,), own)
 
 
 _REQUIRED = " [required]"

@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
-from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from shutil import get_terminal_size
@@ -16,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.commands import ShowOptions, with_options
+from cli import function_of
+from cli.show.commands import Declared, ShowOptions, with_options
 from cli.show.terminal import coloured
 from dalembert.errors import DataError, one_line
 
@@ -33,14 +33,16 @@ def command(
     without: Collection[str] = (),
     eager: Mapping[str, Callable[[bool], None]] | None = None,
     forms: Sequence[str] = (),
-) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
+    example: str = "",
+) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Declared]:
     """Make a command of a function that returns its result: the result is shown as the shared options say.
 
     `options` declares its own by the text of their help, `without` are the shared ones that mean nothing for it, `eager`
-    answers flags that need nothing else, `forms` are suffixes of -o that this command alone writes.
+    answers flags that need nothing else, `forms` are suffixes of -o that this command alone writes, `example` is the worked
+    example with which its help ends.
     """
     shared = [name for name in ShowOptions.__annotations__ if name not in without]
-    return with_options(options, shared, show, eager, forms)
+    return with_options(options, shared, show, eager, forms, example)
 
 
 def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
@@ -226,9 +228,7 @@ def _with_first(result: Result, table: Callable[[], Table]) -> Result:
     return replace(result, tables={**result.tables, next(iter(result.tables)): table})
 
 
-def reported(
-    options: str,
-) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Callable[..., None]]:
+def reported(options: str) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Declared]:
     """Make a command of a function that returns the files to be written and what a report says of them.
 
     `options` declares its own. The files are `beside` of its result, `notes` is what goes to standard output, `warnings`
@@ -381,20 +381,17 @@ def _taking() -> Iterator[list[Result]]:
 
 
 @cache
-def _runner(name: str) -> Callable[[Sequence[str]], Any]:
-    """Return what runs a command on the words behind its name."""
+def parser_of(name: str) -> Any:
+    """Return the parser of the words behind a command's name, which runs the command."""
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command(name)(import_module(f"cli.{name}").run)
-    built = typer.main.get_command(app)
-    return lambda words: built.main(list(words), prog_name="dalembert", standalone_mode=False)
+    app.command(name)(function_of(name))
+    return typer.main.get_command(app)
 
 
 @cache
 def options_of(name: str) -> frozenset[str]:
     """Return the options that a command takes."""
-    app = typer.Typer(add_completion=False)
-    app.command(name)(import_module(f"cli.{name}").run)
-    return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)
+    return frozenset(flag for parameter in parser_of(name).params for flag in parameter.opts)
 
 
 def result_of(words: Sequence[str]) -> Result:
@@ -408,7 +405,7 @@ def result_of(words: Sequence[str]) -> Result:
     name, *rest = words
     with _taking() as taken:
         try:
-            _runner(name)([*rest, "--text", "--json"])
+            parser_of(name).main([*rest, "--text", "--json"], prog_name="dalembert", standalone_mode=False)
         except DataError:
             raise
         except Exception as error:

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "tennis-racket"
 OPTIONS = """
 Arguments:
   body BODY.toml  The body and its state; - is standard input.
@@ -32,7 +31,7 @@ Output:
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="tennis-racket")
 def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """Compute the rotation of a body in time: angular velocity, attitude, momentum and energy at any instant.
 

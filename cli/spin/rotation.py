@@ -86,7 +86,7 @@ class TurningBody:
 
     def exact(self) -> TurningBody:
         """Return the body in doubled numbers, the decimals of the file exact."""
-        from cli.read.exact import plain
+        from dalembert.tables.exact import plain
 
         def each(key: str, value: ArrayLike) -> Any:
             written = self.written.get(key)
@@ -176,7 +176,7 @@ def _of_parts(
     """Return the tensor of a table of parts, the same to 32 digits, and warnings."""
     if not isinstance(named, str):
         raise DataError(f"{file}: parts: found {toml_text(named)}, expected the name of a CSV file")
-    from cli.read.parts import read_parts
+    from rigidbody3d.parts import read_parts
 
     parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
     warnings = list(parts.warnings)
@@ -393,7 +393,7 @@ class Rotation:
         I: Any = body.inertia
         if isinstance(self.states, Trajectory):
             return I if I.ndim == 2 else I[:, None] * np.eye(3)
-        from cli.read.exact import array
+        from dalembert.tables.exact import array
 
         time: Any = array(self.time)
         if isinstance(self.states, FreeState):

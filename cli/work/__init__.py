@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "riul-slider-crank"
 METHOD = (
     "Virtual power: the applied forces and the inertia forces −m·a, −I·α together do no work on the given velocities "
     "(d'Alembert and Lagrange; J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 1–5)."
@@ -29,7 +28,7 @@ Output:
 """
 
 
-@command(OPTIONS)
+@command(OPTIONS, example="riul-slider-crank")
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 

@@ -166,8 +166,8 @@ class WorkBalance:
     @cached_property
     def second(self) -> list[tuple[LinkStates, Again]]:
         """The states of each group and what balances them in 32 digits, of the decimals of the table as they are written."""
-        from cli.read.exact import plain
         from dalembert.arithmetic.doubled_arrays import DoubledComplex
+        from dalembert.tables.exact import plain
 
         groups = []
         for (members, rows), (_, solved) in zip(self.places, self.groups, strict=True):
@@ -190,8 +190,8 @@ class WorkBalance:
 
     def exact_unknowns(self) -> Doubled:
         """The load of each cell of all unknowns in 32 digits, (cells,)."""
-        from cli.read.exact import plain
         from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.tables.exact import plain
 
         values: list[Any] = [again.value for _, again in self.second]
         cells = [
@@ -405,9 +405,9 @@ def _entry(
 ) -> Entry:
     """A force at a velocity, or a torque, a plain number, at an angular velocity."""
     if isinstance(load, float) and isinstance(rate, float):
-        why = why_not(load, rate, works, fastest[1])
+        why = why_not(rate, works, fastest[1])
         return Entry(link, kind, torque=load, omega=rate, power=power, workless=why, field=field)
-    why = why_not(load, rate, works, fastest[0])
+    why = why_not(rate, works, fastest[0])
     return Entry(link, kind, complex(load), complex(rate), power=power, workless=why, field=field)
 
 

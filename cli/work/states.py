@@ -86,7 +86,7 @@ class StateTable:
     @property
     def exact(self) -> dict[str, Any]:
         """The numbers in 32 digits, in SI, of the decimals as they are written; what is blank is zero."""
-        from cli.read.exact import column
+        from dalembert.tables.exact import column
 
         rows = range(self.table.rows)
         values: dict[str, Any] = {name: column(x, rows) for name, x in self.table.numbers.items()}

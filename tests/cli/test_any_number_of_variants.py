@@ -12,8 +12,8 @@ from cli.cases.axes import grids
 from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied
 from cli.cases.loop import Loop
-from cli.forces.cycle import Forces
-from cli.mechanism.solution import Poses
+from cli.mechanism.cycle import Forces
+from cli.mechanism.poses import Poses
 from cli.show.commands import ShowOptions
 from tests.cli.rows import axis
 from tests.cli.rows import rows as as_rows

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.rotation import period_of, taylor
-from cli.read.exact import LONG, as_written
 from cli.spin.rotation import Rotation, read_body
 from cli.spin.tables import constants
+from dalembert.tables.exact import LONG, as_written
 from dalembert.tables.table import Numbers
 
 F = Fraction

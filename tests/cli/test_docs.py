@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from cli.app import COMMANDS, build
+from cli import COMMANDS
+from cli.app import build
 from cli.read.options import HEAD
 from cli.spin.rotation import KEYS
 from dalembert.units import UNITS

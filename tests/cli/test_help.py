@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.app import COMMANDS
+from cli import COMMANDS
 from cli.show.commands import SHARED, help_lines
 from cli.show.terminal import progress, progress_in_time
 from tests.conftest import Dalembert
@@ -265,7 +265,8 @@ def parsed(words: list[str]) -> dict[str, object]:
     """What a command of the options of GRAMMAR takes of some words."""
     import typer
 
-    from cli.show.commands import with_help, with_options
+    from cli.show.commands import with_options
+    from cli.show.help import with_help
     from cli.show.result import Result
 
     taken: list[dict[str, object]] = []
@@ -275,7 +276,8 @@ def parsed(words: list[str]) -> dict[str, object]:
         return Result(tables={}, document=dict)
 
     app = typer.Typer(add_completion=False)
-    app.command(cls=with_help(GRAMMAR, "", str))(with_options(GRAMMAR, (), lambda *_: None)(run))  # type: ignore[arg-type]
+    command = with_options(GRAMMAR, (), lambda *_: None)(run)
+    app.command(cls=with_help(command, str))(command)
     typer.main.get_command(app).main(["a.csv", *words], standalone_mode=False)
     return taken[0]
 

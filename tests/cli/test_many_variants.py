@@ -13,7 +13,7 @@ from cli.cases.axes import grids
 from cli.cases.cases import Cases
 from cli.cases.inputs import Grid, Varied
 from cli.cases.loop import Loop, unchanged
-from cli.mechanism.solution import Poses
+from cli.mechanism.poses import Poses
 from cli.show.commands import ShowOptions
 from dalembert.errors import DataError
 from tests.cli.rows import axis

@@ -7,7 +7,7 @@ from itertools import pairwise, product
 
 import pytest
 
-from cli.renamed import MECHANISM, renamed
+from cli.show.help import MECHANISM, renamed
 from tests.conftest import Dalembert
 from tests.four_bars import four_bar
 

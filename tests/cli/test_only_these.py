@@ -140,8 +140,8 @@ def test_a_body_shows_what_is_named_with_the_same_numbers(dalembert, tmp_path) -
 def test_principal_axes_are_not_computed_for_a_momentum(tmp_path, monkeypatch) -> None:
     from cli.body import tables as of_body
     from cli.body.moving import MovingBody, Request
-    from cli.read.parts import read_bodies
     from rigidbody3d import Body
+    from rigidbody3d.parts import read_bodies
 
     (tmp_path / "parts.csv").write_text(PARTS)
     body = MovingBody(read_bodies(str(tmp_path / "parts.csv"))[0], Request(omega=(0.0, 1.0, 2.0)))

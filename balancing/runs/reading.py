@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read import options
-from cli.read.runs.layouts import runs_layout
-from cli.read.runs.rows import YES, LogRows, Masses, Sorted
-from cli.read.runs.runs import YEAR, Complex, Real, Rows, Runs, channels_of, years
-from cli.read.runs.vectors import Layout
-from cli.read.stored import Sisters, Stored, read_stored, stored_alpha
+from balancing.runs.layouts import runs_layout
+from balancing.runs.rows import YES, LogRows, Masses, Sorted
+from balancing.runs.runs import YEAR, Complex, Real, Rows, Runs, channels_of, years
+from balancing.runs.stored import Sisters, Stored, read_stored, stored_alpha
+from balancing.runs.vectors import Layout
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
@@ -145,17 +144,14 @@ class _Reading:
         channels, channel = channels_of(table, rotor)
         if "run" not in table.texts and of_log:
             run_names, run = _run_names(rotor, channel, when, masses)
-        for name in self.exclude:
-            if name not in run_names:
-                raise options.bad("--exclude", f"no run {quote(name)} in {table.file}")
         return LogRows(
             self.runs, rotor, vibration, masses, run, run_names, self._exact, when, channels, channel
         )
 
     def _exact(self) -> Vectors:
         """Return what each row reads in 32 digits, of the decimals as they are written; 0 where it is blank."""
-        from cli.read.exact import vectors
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+        from dalembert.tables.exact import vectors
 
         numbers = self.table.numbers
         columns = [self.amplitude] if self.four_run else [self.amplitude, numbers["phase"]]
@@ -303,7 +299,7 @@ class MassColumns:
         np.add.at(value, entry, on)
 
         def exact() -> Vectors:
-            from cli.read.exact import vectors
+            from dalembert.tables.exact import vectors
 
             each = vectors(Numbers("", size.unit, amounts, per).exact, Numbers("", unit, around, "angle"))
             return _added(each, entry, len(first))
@@ -377,7 +373,7 @@ def turned(angle: float, unit: str) -> complex:
 
 def turned_exactly(angle: float, unit: str) -> Vectors:
     """e^{iφ} of an angle in 32 digits."""
-    from cli.read.exact import turns
+    from dalembert.tables.exact import turns
 
     return turns(Numbers("", unit, np.array([angle]), "angle"))[0]
 

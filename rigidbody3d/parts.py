@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.turning import TURNS, along, rotation_of, turned, vectors
 from dalembert.angles import cosine_sine
 from dalembert.errors import DataError, needs, quote
 from dalembert.figures import last_place
@@ -19,9 +18,11 @@ from dalembert.hints import nearest
 from dalembert.tables.files import note
 from dalembert.tables.table import Table, read
 from dalembert.units import UNITS, to_si
-from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
-from rigidbody3d.shapes import SHAPES
+from rigidbody3d.body import Body, compose
+from rigidbody3d.inertia import check, tensor
+from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
 from rigidbody3d.solids import Solid, of_tensor
+from rigidbody3d.turning import TURNS, along, rotation_of, turned, vectors
 
 if TYPE_CHECKING:
     from rigidbody3d.solids import Solid
@@ -97,8 +98,8 @@ class _Unturned:
 
     def exact(self) -> Body:
         """Return the parts, turned, to 32 digits: from the decimals of the table as they are written."""
-        from cli.read.exact import column, cosine_and_sine
         from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.tables.exact import column, cosine_and_sine
 
         read, shape = self.table.numbers, np.array(self.shapes)
         cells = {name: column(numbers, self.index) for name, numbers in read.items()}
@@ -154,9 +155,38 @@ class _Unturned:
         return solids
 
 
-def read_parts(path: str) -> Parts:
-    """Read a table of the parts of one body, and put them together."""
-    bodies = read_bodies(path)
+def read_parts(path: str | Path) -> Parts:
+    """Read a table of the parts of one body, and put them together.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV or workbook with a row for each part: its shape, mass or density, place, turn (docs/rigid-body.md).
+
+    Returns
+    -------
+    Parts
+        `whole`, the `Body` that they make; `each`, mass (k,), centre (k, 3) and tensor (k, 3, 3) of the parts, in SI and
+        about their own centres of mass, with their `name` and `shape`; `warnings`.
+
+    Raises
+    ------
+    DataError
+        The table cannot be read, has several bodies, or no body is made of its parts.
+
+    Examples
+    --------
+    Two points on a line, 2 kg at 0 and 1 kg at 0.3 m:
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder, "parts.csv")
+    ...     _ = table.write_text("part,shape,mass_kg,x_mm\\na,point,2,0\\nb,point,1,300\\n")
+    ...     body = read_parts(table).whole
+    >>> float(body.mass), body.center.round(3), body.inertia.diagonal().round(3)
+    (3.0, array([0.1, 0. , 0. ]), array([0.  , 0.06, 0.06]))
+    """
+    bodies = read_bodies(str(path))
     if len(bodies) > 1:
         several = ", ".join(quote(parts.body) for parts in bodies)
         raise DataError(f"{bodies[0].file}: column body: found {several}, expected one body")

@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import balancing
 from dalembert.decimals import Scaled
 from dalembert.errors import DataError
 from dalembert.tables.table import Table, numbered
 from dalembert.units import UNITS, amplitude_kind, from_si, to_si
 
 if TYPE_CHECKING:
+    from balancing.amplitudes import AmplitudeFit
+    from balancing.doubt import Drift
     from balancing.log_again import ExactFit, ExactPrior
+    from balancing.prior import Prior
+    from balancing.run_log import JointFit
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_vectors import Vectors
 
@@ -86,7 +89,7 @@ class Lines:
 class Before:
     """Coefficients of a machine, or of machines like it, that are stored from earlier runs."""
 
-    prior: balancing.Prior
+    prior: Prior
     machines: int
     """How many machines they are of."""
     scatter: float | None
@@ -119,12 +122,17 @@ class Group:
     """Those of the channels, (g, s)."""
     exact: Callable[[], Exact]
     """Readings, masses and standing in 32 digits, as the table has them; computed on request."""
-    fit: balancing.JointFit = field(init=False)
+    fit: JointFit = field(init=False)
     """Initial vibration and coefficients: of all runs together, or the coefficients are stored, or of amplitudes alone."""
-    amplitude_fits: list[list[balancing.AmplitudeFit]] = field(init=False, default_factory=list)
+    amplitude_fits: list[list[AmplitudeFit]] = field(init=False, default_factory=list)
     """The fits of the four-run method, rotor by rotor, plane by plane."""
     before: Before | None = None
     """Where stored coefficients take part in the fit."""
+
+    def __repr__(self) -> str:
+        g, r, s = self.readings.shape
+        size = f"readings ({g}, {r}, {s}), masses ({g}, {r}, {len(self.planes)})"
+        return f"Group({size}, planes {', '.join(self.planes)})"
 
     def before_run(self, j: int) -> Rows:
         """Return for each rotor the run that shows best what the masses of run j do, (g,); -1 where they are not new.
@@ -162,12 +170,16 @@ class Group:
     @cached_property
     def chance(self) -> Real:
         """How often by chance a residual of the fit is as large as each of them, (g, r, s)."""
-        return balancing.outlier_probability(self.fit)
+        from balancing.doubt import outlier_probability
+
+        return outlier_probability(self.fit)
 
     @cached_property
-    def drift(self) -> balancing.Drift | None:
+    def drift(self) -> Drift | None:
         """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
-        return None if self.lines.years is None else balancing.drift(self.fit, self.lines.years)
+        from balancing.doubt import drift
+
+        return None if self.lines.years is None else drift(self.fit, self.lines.years)
 
     @cached_property
     def means(self) -> Complex:
@@ -289,6 +301,11 @@ class Runs:
     """These in 32 digits, where --runout names a file; None: they are the floats."""
     warnings: list[str] = field(default_factory=list)
     """Shown once each, however often they stand here."""
+
+    def __repr__(self) -> str:
+        n = len(self.rotors)
+        size = f"{n} rotor{'s' * (n != 1)}"
+        return f"Runs({self.table.file}: {size}, amplitudes in {self.amplitude_unit}, per {self.per_si})"
 
     @property
     def amplitude_unit(self) -> str:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from cli.read.runs.vectors import AMPLITUDE, MASS, UNBALANCE, Layout, parted_cells, vectors_of
+from balancing.runs.vectors import AMPLITUDE, MASS, UNBALANCE, Layout, parted_cells, vectors_of
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import Heading, plain_word, quantity_meant, words_of

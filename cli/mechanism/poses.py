@@ -158,7 +158,7 @@ def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
     """Return the topics of one mechanism, one assembly after the other."""
     result: list[Topic] = []
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
-        topics = [*_loops(analysis, motion), *_groups(analysis, motion)]
+        topics = [*_loops(motion), *_groups(analysis, motion)]
         if newton and assembly is analysis.assemblies[0]:
             topics.append(_newton(analysis, motion))
         if any(np.any(rate) for rates in motion.poses.rates[:2] for rate in rates):
@@ -171,7 +171,7 @@ def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
     return result
 
 
-def _loops(analysis: Analysis, motion: Motion) -> list[Topic]:
+def _loops(motion: Motion) -> list[Topic]:
     from virtualwork.study.loops import loops
 
     texts = [loop.text for loop in loops(motion.mechanism, motion.assembly.plan)]

@@ -14,11 +14,11 @@ from cli.cases.axes import input_values
 from cli.cases.case import Case, Study
 from cli.cases.poses import bounds_of, keys_of
 from cli.cases.remarks import idle_friction
+from cli.mechanism.motion_tables import ENERGY, columns_of, documents, drift, inputs_of, trusted, way
 from cli.read import options
 from cli.show.commands import ShowOptions
 from cli.show.picture import shown as on_page
 from cli.show.terminal import progress_in_time
-from cli.simulate.tables import ENERGY, columns_of, documents, drift, inputs_of, trusted, way
 from dalembert.arithmetic.engines import anew
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.cases import Rows
-    from cli.simulate.tables import Values
+    from cli.mechanism.motion_tables import Values
     from dalembert.results.columns import Document
     from dalembert.results.way import Topic
     from virtualwork import Mechanism

@@ -13,8 +13,8 @@ from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study
 from cli.cases.poses import bounds_of, cells, keys_of
 from cli.cases.study import METHOD
+from cli.mechanism.tolerance_terms import by_quantity, largest, way
 from cli.read.options import processes
-from cli.tolerance.way import by_quantity, largest, way
 from dalembert.dataclass import dataclass
 from dalembert.drawing.amounts import NOISE
 from dalembert.errors import DataError

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from balancing import pooled_prior, stored_prior
-from cli.read.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
-from cli.read.runs.vectors import Alpha, alpha_of
+from balancing.prior import pooled_prior, stored_prior
+from balancing.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
+from balancing.runs.vectors import Alpha, alpha_of
 from dalembert.angles import phasor
 from dalembert.errors import DataError, quote
 from dalembert.quantities import exactly, parse_number
@@ -43,7 +43,7 @@ def read_runout(path: str, runs: Runs) -> dict[str, complex]:
         out[sensor] = vector
 
     def exact() -> dict[str, Vectors]:
-        from cli.read.exact import vectors
+        from dalembert.tables.exact import vectors
 
         each = vectors(_converted(amplitude.decimals, amplitude.unit, runs.amplitude_unit), phase)
         return {sensor: each[i] for i, sensor in enumerate(sensors)}
@@ -124,7 +124,7 @@ class Stored:
 
     def exact_matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Vectors:
         """Return α (s, p) of a rotor in 32 digits, of the decimals as they are written."""
-        from cli.read.exact import vectors
+        from dalembert.tables.exact import vectors
 
         sizes = self._exact_sizes("magnitude_per", runs)
         return vectors(sizes, self.table.numbers["phase"])[self._rows_of(rotor, channels, self.planes(rotor))]
@@ -144,10 +144,10 @@ class Stored:
         """Return α (s, p), the covariance (s, p, p) and the deviation of the readings in 32 digits; 0 where none is stated."""
         from fractions import Fraction
 
-        from cli.read.exact import vectors
         from dalembert.arithmetic.doubled import PI, Doubled
         from dalembert.arithmetic.doubled_functions import DOUBLED
         from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+        from dalembert.tables.exact import vectors
 
         table, at = self.table, self._rows_of(rotor, channels, planes)
         alpha = vectors(self._exact_sizes("magnitude_per", runs), table.numbers["phase"])[at]

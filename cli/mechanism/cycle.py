@@ -65,7 +65,7 @@ class ForceCase(PoseCase):
 
     def way(self) -> list[Topic]:
         """Return the ledger of every pose, and free-body diagrams."""
-        from cli.forces.links import way
+        from cli.mechanism.free_bodies import way
 
         return way(self.analysis)
 
@@ -85,7 +85,7 @@ class ForceCase(PoseCase):
 
     def result(self) -> Result:
         """Return the result of this mechanism alone, in every form; the states of all links can be expected."""
-        from cli.forces.links import table
+        from cli.mechanism.free_bodies import table
 
         result = super().result()
         result.expected = (*result.expected, lambda: table(self.states().analysis))
@@ -158,7 +158,7 @@ class Forces(PoseStudy):
 
 def _csv_parts(case: PoseCase, digits: bool) -> Iterator[bytes]:
     """Yield the states of all links as CSV; with `digits` only the digits that hold."""
-    from cli.forces.links import table
+    from cli.mechanism.free_bodies import table
     from dalembert.results.digits import digits_that_hold
     from dalembert.results.text import csv_text
 

@@ -14,7 +14,7 @@ from cli.cases.axes import assigned_paths, quantity
 from cli.cases.case import Case, Study
 from cli.cases.cases import beside
 from cli.cases.inputs import Varied
-from cli.fit.targets import targets, wanted, weights
+from cli.mechanism.targets import targets, wanted, weights
 from cli.read import options
 from cli.show.picture import blank
 from cli.show.result import Result

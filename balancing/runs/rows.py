@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.runs.runs import SHOWN, Channel, Complex, Exact, Group, Lines, Real, Rows, Runs
+from balancing.runs.runs import SHOWN, Channel, Complex, Exact, Group, Lines, Real, Rows, Runs
 from dalembert.errors import DataError
 from dalembert.tables.table import numbered
 

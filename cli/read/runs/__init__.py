@@ -1,1 +1,0 @@
-"""Tables and logs of measured runs, as people keep them."""
