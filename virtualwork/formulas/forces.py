@@ -199,13 +199,13 @@ class AppliedMoment(Force, kind="applied moment"):
 
 # --- one load alone, for free-body diagrams ----------------------------------------------------------------------------
 class LoadTorque(Force, kind="load torque"):
-    """A torque of the load case, by its number, N·m."""
+    """A torque of the load case, by its number, N·m; those of friction come last."""
 
     is_rubbed = False
     number: int
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.case.loads[self.number].form(forces.pose)
+        return forces.case.everything[self.number].form(forces.pose)
 
 
 class Load(LoadTorque, kind="load"):

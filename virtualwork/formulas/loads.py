@@ -92,10 +92,6 @@ class Load:
             return None
         return value * moved if self.path is None else dot(value, moved)
 
-    def elastic(self, pose: LoadedPose) -> Number:
-        """The part of `power` that its potential holds; None where it stores nothing."""
-        return None
-
     def wasted(self, pose: LoadedPose, j: int) -> Number:
         """The part of `power` that no potential and no speed holds: of dampers, applied loads, drives."""
         return None if self.stores or self.kind in OWN else self.power(pose, j)

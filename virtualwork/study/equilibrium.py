@@ -274,7 +274,7 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
         rest = Rest(assembly, q[:, None])
         force, size = (values[:, 0] for values in rest.force())
         good = np.isfinite(force)
-    slope = rest.along(np.ones(1))
+    slope = rest.slope()
     # what the rounding of the terms, or of the input itself, makes of zero: the end of a range may be a root
     shift = 2 * EPS * np.abs(q * np.where(np.isfinite(slope), slope, 0.0))
     tiny = np.abs(force) <= 64 * EPS * size + shift
@@ -337,13 +337,13 @@ def _refine(
     x = low + (high - low) * (at_low / (at_low - at_high))
     for _ in range(80):
         rest = Rest(assembly, x[:, None])
-        value = rest.force()[0][:, 0] if order == 0 else rest.along(np.ones(1))
+        value = rest.force()[0][:, 0] if order == 0 else rest.slope()
         left = np.sign(value) == below
         a, b = np.where(left, x, a), np.where(left, b, x)
         step = (a + b) / 2
         if order == 0:
             with np.errstate(divide="ignore", invalid="ignore"):
-                newton = x - value / rest.along(np.ones(1))
+                newton = x - value / rest.slope()
             step = np.where((newton > a) & (newton < b), newton, step)
             step = np.where(value == 0, x, step)
         near = (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), np.abs(high - low))).all()
