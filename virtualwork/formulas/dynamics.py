@@ -31,8 +31,8 @@ from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import FAST, ONE, TOGETHER, Complexes, Number, Reals, leave_out, xy
 from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.statics import Statics
+from virtualwork.plan.joint_forces import Order
 from virtualwork.plan.steps import Joint
 
 
@@ -237,10 +237,10 @@ class Dynamics(NamedForces):
                     result[number] = meet
         return result
 
-    @cached_property
-    def reactions(self) -> JointForces:
+    @property
+    def reactions(self) -> Order:
         """The joints, and how their forces follow from each other."""
-        return JointForces(self.paths)
+        return self.paths.order
 
     @property
     def statics(self) -> Statics | None:

@@ -113,7 +113,7 @@ class Reaction(Force, kind="reaction"):
     body: str
 
     def form(self, forces: PoseForces) -> Number:
-        here = joints_at(forces.joints.joints, self.name, self.body)
+        here = joints_at(forces.order.joints, self.name, self.body)
         return sum((JointForce(joint.key, self.body).value(forces) for joint in here), 0.0)
 
 

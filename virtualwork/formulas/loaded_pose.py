@@ -228,6 +228,11 @@ class LoadedPose:
         """P, complex."""
         return self.st.at(path)
 
+    def rail(self, guide: int) -> Number:
+        """The direction of a guide, a unit vector."""
+        on, d = self.setting.mechanism.guides[guide].on, self.setting.plan.directions[guide]
+        return d if on == GROUND else d * self.st.turn[on]
+
     def coefficient(self, path: Path, j: int) -> Number:
         """∂P/∂q_j, complex."""
         return self.by[j].vector(path, 1)

@@ -311,8 +311,7 @@ class FrictionLoad(Load):
         on = GROUND if self.guide is None else pose.setting.mechanism.guides[self.guide].on
         if self.guide is None or on == GROUND or not self.carries:
             return super().displacement(pose, j)
-        along = pose.setting.plan.directions[self.guide] * pose.st.turn[on]
-        return times(pose.by[j].slide[self.guide][0], self.sign * along)
+        return times(pose.by[j].slide[self.guide][0], self.sign * pose.rail(self.guide))
 
 
 def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:

@@ -178,7 +178,7 @@ class Solving(Poses):
         if apart is not None:
             for value, again in zip(entries.values(), apart[1]._raw(keys), strict=True):
                 value[apart[0]] = again
-        return Statics(forces.joints, entries, self.n, self.lock)
+        return Statics(forces.order, entries, self.n, self.lock)
 
     def _doubts(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """The quantities that show where others have no value, or none from the tape."""

@@ -32,9 +32,11 @@ if TYPE_CHECKING:
 
     from virtualwork.describe.description import Description
     from virtualwork.formulas.load_case import LoadCase
+    from virtualwork.formulas.load_paths import LoadPaths
     from virtualwork.formulas.numbers import Complexes, Reals
     from virtualwork.formulas.quantity import Quantity
-    from virtualwork.formulas.reactions import JointForces
+    from virtualwork.formulas.touches import Touches
+    from virtualwork.plan.joint_forces import Order
     from virtualwork.plan.steps import Joint
 
 SHORT = {
@@ -75,10 +77,11 @@ class Part(NamedTuple):
     """Of a drive or of teeth along a guide, and of a cam: the direction of its effort."""
 
 
-def parts(case: LoadCase, of: JointForces) -> dict[str, list[Part]]:
+def parts(paths: LoadPaths) -> dict[str, list[Part]]:
     """Return what acts on every link by the keys of its quantities."""
-    result: dict[str, list[Part]] = {body: [] for body in of.mechanism.links}
-    for body, part in (*_loads(case), *_joints(case, of), *_meshes(of), *_drives(of.mechanism), *_cams(of)):
+    m, case, of = paths.mechanism, paths.case, paths.order
+    result: dict[str, list[Part]] = {body: [] for body in m.links}
+    for body, part in (*_loads(case), *_joints(case, of), *_meshes(of), *_drives(m), *_cams(paths.touches)):
         if body != GROUND:
             result[body].append(part)
     return result
@@ -93,7 +96,7 @@ def _loads(case: LoadCase) -> Iterator[tuple[str, Part]]:
             yield load.body, Part(name, load.kind, Load(i), LoadPlace(i), 1.0)
 
 
-def _joints(case: LoadCase, of: JointForces) -> Iterator[tuple[str, Part]]:
+def _joints(case: LoadCase, of: Order) -> Iterator[tuple[str, Part]]:
     m = of.mechanism
     rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
     for joint in of.joints:
@@ -164,7 +167,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     >>> [(f.name, complex(f.force[0])) for f in body.forces], [(t.name, float(t.torque[0])) for t in body.torques]
     ([('W', -19.62j), ('O: ground', 19.62j)], [('T', 9.81)])
     """
-    m, poses, of = dynamics.poses.mechanism, dynamics.poses, dynamics.reactions
+    m, poses = dynamics.poses.mechanism, dynamics.poses
     result = {
         body: FreeBody(
             body,
@@ -175,7 +178,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         )
         for body, link in m.links.items()
     }
-    for body, every in parts(dynamics.case, of).items():
+    for body, every in parts(dynamics.paths).items():
         for part in every:
             load, at, along = (_value(dynamics, key) for key in (part.key, part.at, part.along))
             load = part.sign * load if along is None else part.sign * load * along
@@ -192,14 +195,14 @@ def _value(dynamics: Dynamics, key: Any) -> Any:
     return np.asarray(dynamics.value(key) if key.is_force else dynamics.poses.values((key,))[0])
 
 
-def _cams(of: JointForces) -> Iterator[tuple[str, Part]]:
-    for number, touch in enumerate(of.paths.touches.every):
+def _cams(touches: Touches) -> Iterator[tuple[str, Part]]:
+    for number, touch in enumerate(touches.every):
         cam, at, way = touch.drive.cam.cam, ContactPlace(number), ContactWay(number)
         for body, other, sign in ((touch.body, cam, 1.0), (cam, touch.body, -1.0)):
             yield body, Part(f"N: {other}", "contact force", Contact(number), at, sign, way)
 
 
-def _meshes(of: JointForces) -> Iterator[tuple[str, Part]]:
+def _meshes(of: Order) -> Iterator[tuple[str, Part]]:
     """What gears and belts turn each of their links by; of racks the tooth force at the pitch point of the wheel."""
     m = of.mechanism
     for i, mesh in enumerate(m.meshes):

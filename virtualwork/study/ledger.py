@@ -107,10 +107,10 @@ class Moving(Force, kind="moving"):
 
 def _applied(dynamics: Dynamics, i: int, unit: int | None) -> Item:
     load = dynamics.case.everything[i]
-    turns = load.path is None
-    rate = Turning(load.body, unit) if load.path is None else Moving(load.path, unit, load.rail)
-    values = dynamics.values([LoadTorque(i) if turns else Load(i), rate])
-    return Item(load.body, load.kind, *values, turns=turns)
+    path = load.path
+    rate: Force = Turning(load.body, unit) if path is None else Moving(path, unit, load.rail)
+    value, moved = dynamics.values([LoadTorque(i) if path is None else Load(i), rate])
+    return Item(load.body, load.kind, value, moved, path is None)
 
 
 def _drives(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
