@@ -30,7 +30,7 @@ from virtualwork.formulas.loaded_pose import LoadedPose, Setting
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import FAST, ONE, TOGETHER, Complexes, Number, Reals, leave_out, xy
 from virtualwork.formulas.pose_forces import PoseForces
-from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.solving import Solving
 from virtualwork.formulas.statics import Statics
 from virtualwork.plan.joint_forces import Order
 from virtualwork.plan.steps import Joint
@@ -40,7 +40,7 @@ from virtualwork.plan.steps import Joint
 class NamedForces:
     """Forces by the names under which they are handed out, from their values by their keys; each is formed on its first request."""
 
-    poses: Poses
+    poses: Solving
     lock: Lock
 
     def values(self, keys: Sequence[Force]) -> list[Any]:
@@ -107,7 +107,7 @@ class Dynamics(NamedForces):
 
     Attributes
     ----------
-    poses : Poses
+    poses : Solving
     case : LoadCase
         What acts, the same for all motions of an assembly.
     moves : bool
@@ -115,7 +115,7 @@ class Dynamics(NamedForces):
 
     """
 
-    def __init__(self, poses: Poses) -> None:
+    def __init__(self, poses: Solving) -> None:
         self.poses, self.lock = poses, poses.lock
         self.setting = Setting(poses)
         self.moves = self.setting.moves
@@ -165,8 +165,7 @@ class Dynamics(NamedForces):
     @property
     def pose(self) -> LoadedPose:
         """The pose as the loads see it: of floats, or written down."""
-        pose: LoadedPose = (self.poses.recording.forces if self.on_tape else self.forces).pose
-        return pose
+        return (self.poses.recording.forces if self.on_tape else self.forces).pose
 
     def _solve(self, targets: Iterable[str], order: int) -> None:
         k, wanted = len(self.poses.mechanism.inputs), tuple(targets)
@@ -245,8 +244,7 @@ class Dynamics(NamedForces):
     @property
     def statics(self) -> Statics | None:
         """All equilibrium equations at once, where the constraints are redundant; else None."""
-        result: Statics | None = self.poses.statics if self.reactions.redundant else None
-        return result
+        return self.poses.statics if self.reactions.redundant else None
 
 
 class Moving(Protocol):

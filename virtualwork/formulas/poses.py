@@ -338,30 +338,6 @@ class Poses:
         """Quantities from the tape, of one pose too."""
         raise NotImplementedError
 
-    @property
-    def recording(self) -> Any:
-        """The formulas, written down."""
-        raise NotImplementedError
-
-    @property
-    def friction_iterations(self) -> int:
-        """How often friction and joint forces were exchanged until they agreed."""
-        raise NotImplementedError
-
-    @property
-    def locked(self) -> NDArray[np.bool_]:
-        """(n,): poses in which friction locks the mechanism."""
-        raise NotImplementedError
-
-    @property
-    def statics(self) -> Any:
-        """All equilibrium equations at once, where the constraints are redundant."""
-        raise NotImplementedError
-
-    def place(self, table: Any) -> Reals:
-        """What the table of a load is over, (n,)."""
-        raise NotImplementedError
-
     def by_floats(self, quantities: Sequence[Quantity]) -> list[Any]:
         """Quantities of the motion of one pose, by the formulas as they stand, (1,) each."""
         result: list[Any] = []

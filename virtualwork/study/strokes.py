@@ -18,13 +18,13 @@ from dalembert.dataclass import dataclass
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.newton import bracketed
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.quantity import Quantity
 
 SAMPLES = 720
 # what moves less than this, of the mechanism's size or of a radian, rests; at a limit of the input places are known to √ε
 RESTS, RESTS_AT_LIMITS = 1e-12, 4 * math.sqrt(EPS)
-ROUNDS = 60
 # periods of the loops within which all that turns beside them is looked for to come back
 PERIODS = 32
 # places nearer than this, in sizes of the mechanism or radians, are one
@@ -249,20 +249,11 @@ class _Search:
         return sign * value, at
 
     def _refined(self, shown: _Place, low: Reals, high: Reals, sign: int) -> Reals:
-        """Zeros of the rate in brackets, all at once: Newton's step where it stays inside, else the middle."""
-        a, b = low.copy(), high.copy()
-        x = (a + b) / 2
-        for _ in range(ROUNDS):
-            at = self._poses(x)
-            slope, bend = (sign * shown.of(at.values((shown.rate(k),))[0]) for k in (1, 2))
-            up = slope > 0
-            a, b = np.where(up, x, a), np.where(up, b, x)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                newton = x - slope / bend
-            step = np.where((newton > a) & (newton < b), newton, (a + b) / 2)
-            step = np.where(slope == 0, x, step)
-            done = bool((np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), high - low)).all())
-            x = step
-            if done:
-                break
-        return np.asarray(x)
+        """Zeros of the rate in brackets, all at once."""
+
+        def at(x: Reals) -> tuple[Reals, Reals]:
+            poses = self._poses(x)
+            slope, bend = (sign * shown.of(poses.values((shown.rate(k),))[0]) for k in (1, 2))
+            return slope, bend
+
+        return bracketed(at, low, high, 1.0, (low + high) / 2)
