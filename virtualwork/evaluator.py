@@ -172,8 +172,7 @@ def key_of(assembly: Assembly, name: str) -> Quantity | None:
     if kind == "links" and of:
         return Angle(known(of[0], m.links, "link"), order(LINK))
     if kind == "slides" and of:
-        guides = {guide.point: i for i, guide in enumerate(m.guides)}
-        return Slide(guides[known(of[0], guides, "slot or slider")], order(SLIDE))
+        return Slide(m.guided[known(of[0], m.guided, "slot or slider")], order(SLIDE))
     if kind == "effort":
         inputs = {entry.name: j for j, entry in enumerate(m.inputs)}
         return Effort(inputs[known(of[0], inputs, "input")] if of else 0)

@@ -63,7 +63,7 @@ def _places(assembly: Assembly) -> list[Component]:
     """Slides, points and links, but for the input."""
     m = assembly.mechanism
     driven = m.inputs[0]
-    guided = dict.fromkeys(g.point for g in reversed(m.guides) if g.point != driven.slider)
+    guided = [name for name in reversed(m.guided) if name != driven.slider]
     turning = [link for link in m.links if link != driven.link]
     return [*slides(m, guided, 0), *points(m, m.points, 0), *links(turning, 0)]
 
