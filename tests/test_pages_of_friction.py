@@ -59,7 +59,7 @@ def forces_of(m: Mechanism, poses: list[float], speed: float) -> tuple[dict[str,
     """All forces by their names, and the motion."""
     motion = m.motion(poses, speed, 0.0)
     every: dict[str, Component] = {}
-    for each in forces(m, motion.dynamics.reactions.order.pairs):
+    for each in forces(m, motion.dynamics.reactions.pairs):
         if each.key and not each.less:
             every.setdefault(each.names[0], each)
     return every, motion

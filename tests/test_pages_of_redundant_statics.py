@@ -22,7 +22,7 @@ pytestmark = needs_node
 def everything(motion: Motion) -> tuple[dict[str, Component], str]:
     """The forces of a motion by their names, and its page."""
     every: dict[str, Component] = {}
-    for each in forces(motion.mechanism, motion.dynamics.reactions.order.pairs):
+    for each in forces(motion.mechanism, motion.dynamics.reactions.pairs):
         if each.key and not each.less:
             every.setdefault(each.names[0], each)
     page = motion.page(forces=True).html

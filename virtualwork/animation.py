@@ -317,7 +317,7 @@ def of_motion(poses: Poses, drawing: Drawing, forces: Forces | None, note: str =
     table = columns(poses)
     over = list(table)[: poses.inputs.shape[1]]
     del table["assembled"]
-    pairs = () if forces is None else forces.reactions.order.pairs
+    pairs = () if forces is None else forces.reactions.pairs
     arrows = [JointForce.of(*pair) for pair in pairs]
     if forces is not None:
         table |= force_columns(forces, pairs)

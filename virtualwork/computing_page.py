@@ -78,7 +78,7 @@ class Computed(Series):
                     for part in every
                 ],
             }
-            for link, every in parts(forces.case, forces.joints).items()
+            for link, every in parts(forces.paths).items()
         ]
         return {"loose": loose}
 
@@ -426,7 +426,7 @@ def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None) -> Pag
     listed = [each for each in named if not each.order or moves]
     arrows: list[JointForce] = []
     if forces is not None:
-        pairs = forces.reactions.order.pairs
+        pairs = forces.reactions.pairs
         every = quantities_of_forces(m, pairs)
         named += every
         listed += [each for each in every if each.key and not each.reverse]

@@ -22,6 +22,7 @@ from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.quantity import Quantity
 from virtualwork.formulas.tapes import Ready, ready, recorded, taped
+from virtualwork.plan.steps import joints
 from virtualwork.quantities import named
 
 POINT = ("position", "velocity", "acceleration", "jerk")
@@ -171,14 +172,12 @@ def key_of(assembly: Assembly, name: str) -> Quantity | None:
     if kind == "links" and of:
         return Angle(known(of[0], m.links, "link"), order(LINK))
     if kind == "slides" and of:
-        guides = {guide.point: i for i, guide in enumerate(m.guides)}
-        return Slide(guides[known(of[0], guides, "slot or slider")], order(SLIDE))
+        return Slide(m.guided[known(of[0], m.guided, "slot or slider")], order(SLIDE))
     if kind == "effort":
         inputs = {entry.name: j for j, entry in enumerate(m.inputs)}
         return Effort(inputs[known(of[0], inputs, "input")] if of else 0)
     if kind == "reactions" and len(of) == 2:
-        forces = recorded(assembly, (True, True, False)).forces.joints
-        there = {joint.name: joint for joint in forces.joints if of[1] in joint.bodies}
+        there = {joint.name: joint for joint in joints(m) if of[1] in joint.bodies}
         return Reaction(known(of[0], there, f"joint of {of[1]}"), of[1])
     if name == "shaking.force":
         return Shaking()

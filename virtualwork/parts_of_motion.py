@@ -378,10 +378,9 @@ class NamedParts(Generic[P, L, S]):
 
     def slide(self, name: str) -> S:
         """Return the motion along the guide in which the named point runs."""
-        for i, guide in enumerate(self.mechanism.guides):
-            if guide.point == name:
-                return self.kinds[2](self, i)
-        points = dict.fromkeys(guide.point for guide in self.mechanism.guides)
-        raise DescriptionError(
-            f"no slot or slider runs at a point named '{name}'{choices(str(name), points)}"
-        )
+        guided = self.mechanism.guided
+        if name not in guided:
+            raise DescriptionError(
+                f"no slot or slider runs at a point named '{name}'{choices(str(name), guided)}"
+            )
+        return self.kinds[2](self, guided[name])

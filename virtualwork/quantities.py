@@ -126,13 +126,12 @@ def points(m: Description, names: Iterable[str], order: int) -> list[Component]:
 
 def slides(m: Description, names: Iterable[str], order: int) -> list[Component]:
     """Travels along guides and their rates up to an order."""
-    guides = {g.point: i for i, g in reversed(list(enumerate(m.guides)))}
     return [
         part
         for name in names
         for k in range(order + 1)
         for part in called(
-            [Component(("slides", name, SLIDE[k]), f"{name}_{SLIDE[k]}", Slide(guides[name], k))], name, k
+            [Component(("slides", name, SLIDE[k]), f"{name}_{SLIDE[k]}", Slide(m.guided[name], k))], name, k
         )
     ]
 
@@ -151,8 +150,7 @@ def links(names: Iterable[str], order: int) -> list[Component]:
 
 def places(m: Description, order: int, words: Iterable[str] = ()) -> list[Component]:
     """All that moves, in the order of tables, and the vectors between two points that these words name."""
-    guided = dict.fromkeys(g.point for g in m.guides)
-    every = [*points(m, m.points, order), *slides(m, guided, order), *links(m.links, order)]
+    every = [*points(m, m.points, order), *slides(m, m.guided, order), *links(m.links, order)]
     pairs = dict.fromkeys(pair for word in words if (pair := _two_points(m, word)) is not None)
     touches = [part for number in range(len(m.cams)) for part in cam(m, number, TOUCH)]
     return [*every, *touches, *(part for pair in pairs for part in between(m, *pair, order))]

@@ -21,7 +21,7 @@ from cli.cases.poses import bound, bounds_of, cells, cells_of, column, keys_of, 
 from dalembert.results.columns import Column, Table, finite, listed, names
 from dalembert.results.way import Topic, figures, vector_text
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.forces import Applied, AppliedMoment
+from virtualwork.formulas.forces import Applied, AppliedMoment, Rail
 from virtualwork.formulas.kinematics import Angle, Carried, Point
 from virtualwork.quantities import FORCE, LINK, POINT, links, vector
 
@@ -236,9 +236,7 @@ def _velocity(motion: Motion, link: str, point: complex | str, field: int | None
 
 def _rail(motion: Motion, guide: int) -> NDArray[np.complex128]:
     """Return the direction of a guide."""
-    forces = motion.dynamics
-    (rail,) = forces.over([partial(forces.reactions.rail, guide=guide)], complex)
-    return np.asarray(rail)
+    return np.asarray(motion.dynamics.value(Rail(guide)))
 
 
 def _carried(motion: Motion, guide: int, field: int | None) -> NDArray[np.complex128]:

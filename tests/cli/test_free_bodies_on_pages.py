@@ -80,6 +80,7 @@ def test_belts_turn_every_link(dalembert: Dalembert, tmp_path: Path, browser: An
         ("crank-press/press.toml", "75deg", np.radians([75.0]), {"links.rod.B.x": 0.37}),
         ("robot-arm/arm.toml", "upper=20deg,fore=20deg", [[TURN, TURN]], {"links.fore.mass": 3.5}),
         ("boom/boom.toml", "", None, {}),
+        ("cam-valve/cam-valve.toml", "50deg", np.radians([50.0]), {"cams.1.base_radius": 0.021}),
         ("rack-lift/rack-lift.toml", "30deg", np.radians([30.0]), {"racks.1.radius": 0.031}),
         ("lift.toml", "B=0.4m,arm=20deg", [[0.4, TURN]], {"links.block.mass": 5.0}),
     ],

@@ -66,7 +66,7 @@ def tried(
         return None
     every = places(m, ORDERS)
     if of:
-        every += forces(m, first.dynamics.reactions.order.pairs)
+        every += forces(m, first.dynamics.reactions.pairs)
     named: dict[str, Component] = {}
     for each in every:
         if each.key and not each.less:

@@ -28,7 +28,7 @@ def values(run: Run, way: Any, times: Any, moved: Any = None) -> Values:
         for rate in ("position", "velocity", "acceleration"):
             x, y = getattr(motion.point(name), rate).T
             result |= {f"{name} {rate} x": x, f"{name} {rate} y": y}
-    for of, on, *_ in run.first_motion.dynamics.reactions.order.pairs:
+    for of, on, *_ in run.first_motion.dynamics.reactions.pairs:
         x, y = motion.reaction(of.name, on=on).T
         result |= {f"{of.name} on {on} x": x, f"{of.name} on {on} y": y}
     return result

@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from virtualwork import Input, Link, Mechanism, TorsionSpring
+from virtualwork import Guess, Guide, Input, Link, Mechanism, TorsionSpring
 from virtualwork.digits.exact import Gap
+from virtualwork.evaluator import key_of
+from virtualwork.family.design import numbers_of
 from virtualwork.family.part import Assembled
 from virtualwork.formulas.forces import Effort, Force, JointForce, NewtonEuler, Over, Reaction, Rub, Shaking
 from virtualwork.formulas.kinematics import Angle, AnglePartial, Point, PointPartial, Slide, Turn
 from virtualwork.formulas.loops import Closed, Margin, Size
 from virtualwork.formulas.quantity import NOTHING, Quantity
+from virtualwork.quantities import slides
 
 
 def kinds(of: type[Quantity] = Quantity) -> set[type[Quantity]]:
@@ -103,3 +106,15 @@ def test_the_error_of_what_acts_on_a_link() -> None:
     assert (force_error == 0).all()
     assert (off <= 1.0001 * error + 1e-30).all()
     assert (error <= 4 * np.spacing(np.abs(torque))).all()
+
+
+def test_a_point_in_two_guides_has_its_place_in_the_first() -> None:
+    ground = {"O": 0j, "C": 0.15 - 0.2j}
+    links = {"crank": Link({"O": 0j, "A": 0.05}), "rod": Link({"A": 0j, "B": 0.2}), "lever": Link({"C": 0j})}
+    guides = [Guide("B", "rod"), Guide("B", "rod", on="lever", through="C", angle=np.pi / 2)]
+    guess = Guess(1.0, {"rod": -0.2, "lever": 0.0})
+    m = Mechanism(ground, links, guides, inputs=Input("crank"), guess=guess)
+    np.testing.assert_allclose(m.motion(0.0).slide("B").position, 0.25)
+    assert [each.key for each in slides(m, ["B"], 0)] == [Slide(0, 0)]
+    assert key_of(m.assembly, "slides.B") == Slide(0, 0)
+    assert numbers_of(m, "slides.B") == (Slide(0, 0),)

@@ -185,10 +185,8 @@ class Continuation:
                 solution, closed = newton(self.loops, st, guess[None], self.size, limit=8)
             if closed[0]:
                 new, det = self._rate(st, solution[0])
-                # a slide that runs away is measured by itself
-                far = np.maximum(np.abs(x), self.size)
-                far[: len(self.group.angles)] = 1.0
-                if np.isfinite(new).all() and fine_steps(side * step, solution[0] - x, rate, new, far):
+                ends = x, solution[0], rate, new
+                if np.isfinite(new).all() and fine_steps(self.group, self.size, side * step, *ends):
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
                     self._put(side, to, solution[0], new, det)
@@ -372,8 +370,11 @@ class Continuation:
         )
 
 
-def fine_steps(step: Number, moved: Reals, rate: Reals, new: Reals, far: Reals) -> Any:
-    """Whether steps are short enough: by how much the unknowns moved, their rates at both ends, and their scales, (…, unknowns)."""
+def fine_steps(group: Group, size: Number, step: Number, x: Reals, to: Reals, rate: Reals, new: Reals) -> Any:
+    """Whether steps are short enough, by a group's unknowns and their rates at both ends, (…, unknowns)."""
+    # a slide that runs away is measured by itself
+    far, moved = np.maximum(np.abs(x), size), to - x
+    far[..., : len(group.angles)] = 1.0
     # the cubic's own defect: what the two rates say of the step, against what it was
     defect = np.abs((moved - step * 0.5 * (rate + new)) / far).max(axis=-1)
     change = np.abs(moved / far).max(axis=-1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.change_point import Along
-from virtualwork.branch.continuation import FINEST
+from virtualwork.branch.continuation import FINEST, fine_steps
 from virtualwork.formulas.group_loops import write_unknowns
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import Complexes, Reals, solve, stack_rows
@@ -29,7 +29,6 @@ def along_lines(track: Along, group: Group, st: State) -> None:
     # of each pose: the share of its way that is gone, the next step, and dx of the whole way
     gone, step = np.zeros(n), longest.copy()
     slope = _slope(track, group, before, at + 0 * way, way, x)
-    angles = np.arange(x.shape[1]) < len(group.angles)
     left = np.asarray(np.isfinite(way).all(axis=1))
     closed = left.copy()
     while left.any():
@@ -41,12 +40,8 @@ def along_lines(track: Along, group: Group, st: State) -> None:
             track.run(before, trial)
             start = x[i] + moved * slope[i]
             solution, ok = newton(assembly.loops(group), trial, start, m.size, limit=8)
-            far = np.where(angles, 1.0, np.maximum(np.abs(x[i]), m.size))
-            change = np.abs((solution - x[i]) / far).max(axis=1, initial=0.0)
             new = _slope(track, group, before, at + to[:, None] * way[i], way[i], solution)
-            # the cubic's own defect, as along one input
-            defect = np.abs((solution - x[i] - moved * 0.5 * (slope[i] + new)) / far).max(axis=1, initial=0.0)
-            ok &= (defect <= 0.05 * np.maximum(change, 1e-6)) & (change < 0.5)
+            ok &= fine_steps(group, m.size, moved, x[i], solution, slope[i], new)
         some = i[ok]
         x[some], slope[some], gone[some] = solution[ok], new[ok], to[ok]
         step[some] = np.minimum(2 * step[some], longest[some])

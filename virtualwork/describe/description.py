@@ -244,9 +244,17 @@ class Description(Record):
         """The ratios of gears and belts."""
         return *(gear.ratio for gear in self.gears), *(belt.ratio for belt in self.belts)
 
+    @cached_property
+    def guided(self) -> dict[str, int]:
+        """The points that run in guides, each with the number of its guide: of two of them that of the first."""
+        numbers: dict[str, int] = {}
+        for i, guide in enumerate(self.guides):
+            numbers.setdefault(guide.point, i)
+        return numbers
+
     def guide_at(self, point: str | None) -> int:
         """The guide in which a point runs."""
-        return next(i for i, guide in enumerate(self.guides) if guide.point == point)
+        return self.guided[str(point)]
 
     def guide_of(self, entry: Input) -> int:
         """The guide along which a slide input drives."""

@@ -371,7 +371,6 @@ def numbers_of(m: Description, name: str) -> tuple[Quantity, ...]:
     if room not in ROOMS or not of:
         room, of = "points", name
     points = {point: body for body, named in m.bodies.items() for point in named}
-    guides = {guide.point: i for i, guide in enumerate(m.guides)}
     owner, _, axis = of.rpartition(".")
     if room == "points" and of in points:
         return tuple(Coordinate(points[of], 0j, of, i) for i in (0, 1))
@@ -379,11 +378,11 @@ def numbers_of(m: Description, name: str) -> tuple[Quantity, ...]:
         return (Coordinate(points[owner], 0j, owner, AXES.index(axis)),)
     if room == "links" and of in m.links:
         return (Angle(of, 0),)
-    if room == "slides" and of in guides:
-        return (Slide(guides[of], 0),)
+    if room == "slides" and of in m.guided:
+        return (Slide(m.guided[of], 0),)
     if room == "effort" and of == m.inputs[0].name:
         return (Effort(0),)
-    every = {"points": points, "links": m.links, "slides": guides, "effort": (str(m.inputs[0].name),)}[room]
+    every = {"points": points, "links": m.links, "slides": m.guided, "effort": (str(m.inputs[0].name),)}[room]
     raise DescriptionError(f"no {ROOMS[room]} is named '{of}'{choices(of, every)}")
 
 

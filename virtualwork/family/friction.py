@@ -29,8 +29,7 @@ def friction_of(formulas: VariedFormulas, entering: Callable[[str], Any], shape:
     recording, lanes = formulas.recording, shape[0] * shape[1]
     c = len(recording.forces.case.contacts)
     with recording.lock:
-        if "friction" not in recording.forms:
-            recording.forms["friction"] = written(recording)
+        tape = recording.rubbing = recording.rubbing or written(recording)
         keys = [Bearing(k) for k in range(c)]
         loaded = formulas.tape(keys)
 
@@ -43,6 +42,6 @@ def friction_of(formulas: VariedFormulas, entering: Callable[[str], Any], shape:
         rows = run(loaded, frictions)
         return np.reshape([key.of_rows(rows, lanes) for key in keys], (c, lanes))
 
-    rows = run(recording.forms["friction"], np.empty((0, lanes)))
+    rows = run(tape, np.empty((0, lanes)))
     friction, _ = settled(*read(rows, c, lanes, bears), bears)
     return friction.reshape(c, *shape)

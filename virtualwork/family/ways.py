@@ -185,8 +185,6 @@ class AlongInput(Ways):
         rate = np.stack(rates, axis=-1)
         place = np.arange(m)
         needed = (place >= first[:, None]) & (place <= last[:, None])
-        far = np.maximum(np.abs(x), size)
-        far[..., : len(group.angles)] = 1.0
         sound = (
             closed.reshape(self.n, m) & np.isfinite(rate).all(axis=2) & (det == det[:, [here]]) & (det != 0)
         )
@@ -198,8 +196,8 @@ class AlongInput(Ways):
         sound[:, here] &= np.abs(rate[:, here] / unit).max(axis=1) * self.own.track.length < STEEP
         # from the guess outwards
         a, b = np.append(place[1 : here + 1], place[here:-1]), np.append(place[:here], place[here + 1 :])
-        moved, step = x[:, b] - x[:, a], (q[b] - q[a])[:, None]
-        fine = fine_steps(step, moved, rate[:, a], rate[:, b], far[:, a])
+        step = (q[b] - q[a])[:, None]
+        fine = fine_steps(group, size[:, a], step, x[:, a], x[:, b], rate[:, a], rate[:, b])
         self.followed &= (sound | ~needed).all(axis=1) & (fine | ~(needed[:, a] & needed[:, b])).all(axis=1)
         self._nodes[name] = q, x, rate
 
@@ -248,9 +246,7 @@ class AlongLines(Ways):
             fixed, size = some._fixed(group, there[:, None])
             new, closed = newton(some._loops[group.name], fixed, x + step * slope, size, limit=8)
             after = some._slope(group, there, ways, new)
-            far = np.maximum(np.abs(x), size[:, None])
-            far[:, : len(group.angles)] = 1.0
-            closed &= fine_steps(step, new - x, slope, after, far)
+            closed &= fine_steps(group, size[:, None], step, x, new, slope, after)
             result[rows[closed & last]] = new[closed & last]
             on = closed & ~last
             rows, x, slope, ways, some = rows[on], new[on], after[on], ways[on], some.of(on)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -30,10 +30,9 @@ from virtualwork.formulas.loaded_pose import LoadedPose, Setting
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import FAST, ONE, TOGETHER, Complexes, Number, Reals, leave_out, xy
 from virtualwork.formulas.pose_forces import PoseForces
-from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.reactions import JointForces
+from virtualwork.formulas.solving import Solving
 from virtualwork.formulas.statics import Statics
+from virtualwork.plan.joint_forces import Order
 from virtualwork.plan.steps import Joint
 
 
@@ -41,7 +40,7 @@ from virtualwork.plan.steps import Joint
 class NamedForces:
     """Forces by the names under which they are handed out, from their values by their keys; each is formed on its first request."""
 
-    poses: Poses
+    poses: Solving
     lock: Lock
 
     def values(self, keys: Sequence[Force]) -> list[Any]:
@@ -108,21 +107,17 @@ class Dynamics(NamedForces):
 
     Attributes
     ----------
-    poses : Poses
+    poses : Solving
     case : LoadCase
         What acts, the same for all motions of an assembly.
     moves : bool
         Whether anything moves at all.
 
-    Parameters
-    ----------
-    at_rest : bool
-        Whether nothing moves, whatever the rates of the inputs.
     """
 
-    def __init__(self, poses: Poses, *, at_rest: bool = False) -> None:
+    def __init__(self, poses: Solving) -> None:
         self.poses, self.lock = poses, poses.lock
-        self.setting = Setting(poses, at_rest)
+        self.setting = Setting(poses)
         self.moves = self.setting.moves
         self._known: dict[Force, Any] = {}
         recordings, key = poses.branch.recordings, ("loads", self.moves)
@@ -170,16 +165,7 @@ class Dynamics(NamedForces):
     @property
     def pose(self) -> LoadedPose:
         """The pose as the loads see it: of floats, or written down."""
-        pose: LoadedPose = (self.poses.recording.forces if self.on_tape else self.forces).pose
-        return pose
-
-    def along(self, targets: Iterable[str]) -> Rates | None:
-        """The derivatives of one pose to the second order along its rates; None at a singular pose."""
-        try:
-            self.poses.advance(tuple(targets), 2)
-        except (ZeroDivisionError, OverflowError):
-            return None
-        return self.poses.along()
+        return (self.poses.recording.forces if self.on_tape else self.forces).pose
 
     def _solve(self, targets: Iterable[str], order: int) -> None:
         k, wanted = len(self.poses.mechanism.inputs), tuple(targets)
@@ -187,30 +173,6 @@ class Dynamics(NamedForces):
             self.poses.advance(wanted, 1, j)
         if k == 1 or self.moves:
             self.poses.advance(wanted, order)
-
-    def over(
-        self,
-        forms: Sequence[Callable[[LoadedPose], Number]],
-        kind: type,
-        targets: Iterable[str] = (),
-        order: int = 1,
-        name: str = "",
-    ) -> list[Any]:
-        """What forms make of the pose as the loads see it, (n,) each; NaN where a pose is not assembled.
-
-        `targets`: what they depend on beyond the loads and the places of all joints, with derivatives up to an order.
-        `name`: under which the tape of forms that are the same for all poses is kept.
-        """
-        wanted = tuple(targets)
-        if self.on_tape:
-            return self.poses.formed(forms, kind, wanted, order, name)
-        try:
-            self.forces.solve_places()
-            self._solve(wanted, order)
-            values = [form(self.forces.pose) for form in forms]
-        except (ZeroDivisionError, OverflowError):
-            return self.poses.formed(forms, kind, wanted, order, name)
-        return [self._there(np.array([0.0 if value is None else value], kind)) for value in values]
 
     def _there(self, value: Any) -> Any:
         """A value of one pose, NaN where that is not assembled."""
@@ -274,16 +236,15 @@ class Dynamics(NamedForces):
                     result[number] = meet
         return result
 
-    @cached_property
-    def reactions(self) -> JointForces:
+    @property
+    def reactions(self) -> Order:
         """The joints, and how their forces follow from each other."""
-        return JointForces(self.paths)
+        return self.paths.order
 
     @property
     def statics(self) -> Statics | None:
         """All equilibrium equations at once, where the constraints are redundant; else None."""
-        result: Statics | None = self.poses.statics if self.reactions.redundant else None
-        return result
+        return self.poses.statics if self.reactions.redundant else None
 
 
 class Moving(Protocol):

@@ -113,7 +113,7 @@ class Reaction(Force, kind="reaction"):
     body: str
 
     def form(self, forces: PoseForces) -> Number:
-        here = joints_at(forces.joints.joints, self.name, self.body)
+        here = joints_at(forces.order.joints, self.name, self.body)
         return sum((JointForce(joint.key, self.body).value(forces) for joint in here), 0.0)
 
 
@@ -199,13 +199,13 @@ class AppliedMoment(Force, kind="applied moment"):
 
 # --- one load alone, for free-body diagrams ----------------------------------------------------------------------------
 class LoadTorque(Force, kind="load torque"):
-    """A torque of the load case, by its number, N·m."""
+    """A torque of the load case, by its number, N·m; those of friction come last."""
 
     is_rubbed = False
     number: int
 
     def form(self, forces: PoseForces) -> Number:
-        return forces.case.loads[self.number].form(forces.pose)
+        return forces.case.everything[self.number].form(forces.pose)
 
 
 class Load(LoadTorque, kind="load"):

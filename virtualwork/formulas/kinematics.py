@@ -215,3 +215,24 @@ class CurvatureRadius(OfCam, kind="curvature radius"):
 
     def place(self, of: Planned, st: State) -> Number:
         return self._touch(of).at(st).curvature_radius()
+
+
+class ContactWay(OfCam, kind="contact way"):
+    """The direction in which a cam presses on its follower, a unit vector."""
+
+    is_vector = True
+
+    def place(self, of: Planned, st: State) -> Number:
+        touch = self._touch(of)
+        unit = touch.at(st).unit()
+        return touch.drive.cam.sign * unit / abs(unit)
+
+
+class ContactPlace(OfCam, kind="contact at"):
+    """Where a cam and its follower touch, m."""
+
+    is_vector = True
+
+    def place(self, of: Planned, st: State) -> Number:
+        touch = self._touch(of)
+        return touch.axis(st) + touch.at(st).touch()

@@ -107,7 +107,9 @@ class Lanes(Solving):
 
     def taped(self, keys: Sequence[Quantity]) -> list[Any]:
         """Quantities from the tape, of one pose too."""
-        self._fill(tuple(key for key in keys if key not in self.known))
+        new = tuple(key for key in keys if key not in self.known)
+        if new:
+            self._fill(new)
         return [self.known[key].copy() for key in keys]
 
     def _often(self, keys: tuple[Quantity, ...]) -> bool:

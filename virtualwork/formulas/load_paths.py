@@ -433,15 +433,13 @@ class ToothForce(ForceTerm):
     lasts = True
 
     def form(self, pose: LoadedPose) -> tuple[float, Number]:
-        m, plan = self.paths.mechanism, self.paths.plan
-        g = m.guides[self.guide]
+        g = self.paths.mechanism.guides[self.guide]
         # the ground has no forces of its own: it feels the reverse of the link's
         body, sign = (g.link, 1.0) if g.link != GROUND else (g.on, -1.0)
         force = self.paths.side((f"guide:{self.guide}", body)).value(pose)
         if force is None:
             return 1.0, None
-        rail = plan.directions[self.guide]
-        return sign, dot(force, rail if g.on == GROUND else rail * pose.st.turn[g.on])
+        return sign, dot(force, pose.rail(self.guide))
 
     def reads(self) -> Iterable[ForceTerm | None]:
         g = self.paths.mechanism.guides[self.guide]

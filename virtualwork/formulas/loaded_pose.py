@@ -66,22 +66,20 @@ class Shared:
 
 
 class Setting(Shared):
-    """That of poses; at rest nothing moves, whatever the rates of the inputs."""
+    """That of poses."""
 
-    def __init__(self, poses: Poses, at_rest: bool) -> None:
+    def __init__(self, poses: Poses) -> None:
         super().__init__(poses.mechanism, poses.plan)
-        self.poses, self.at_rest = poses, at_rest
+        self.poses = poses
         self._followed: dict[TorsionSpring, Samples] = {}
 
     @cached_property
     def moves(self) -> bool:
         """Whether anything moves at all: a speed or an acceleration that is not zero."""
-        return not self.at_rest and any(self.poses.moves[:2])
+        return any(self.poses.moves[:2])
 
     @property
     def rates(self) -> tuple[Number, Number]:
-        if self.at_rest:
-            return None, None
         speed, acceleration, _ = self.poses.rates
         return alone(speed[0]), alone(acceleration[0])
 
@@ -229,6 +227,11 @@ class LoadedPose:
     def position(self, path: Path) -> Number:
         """P, complex."""
         return self.st.at(path)
+
+    def rail(self, guide: int) -> Number:
+        """The direction of a guide, a unit vector."""
+        on, d = self.setting.mechanism.guides[guide].on, self.setting.plan.directions[guide]
+        return d if on == GROUND else d * self.st.turn[on]
 
     def coefficient(self, path: Path, j: int) -> Number:
         """∂P/∂q_j, complex."""

@@ -92,10 +92,6 @@ class Load:
             return None
         return value * moved if self.path is None else dot(value, moved)
 
-    def elastic(self, pose: LoadedPose) -> Number:
-        """The part of `power` that its potential holds; None where it stores nothing."""
-        return None
-
     def wasted(self, pose: LoadedPose, j: int) -> Number:
         """The part of `power` that no potential and no speed holds: of dampers, applied loads, drives."""
         return None if self.stores or self.kind in OWN else self.power(pose, j)
@@ -315,8 +311,7 @@ class FrictionLoad(Load):
         on = GROUND if self.guide is None else pose.setting.mechanism.guides[self.guide].on
         if self.guide is None or on == GROUND or not self.carries:
             return super().displacement(pose, j)
-        along = pose.setting.plan.directions[self.guide] * pose.st.turn[on]
-        return times(pose.by[j].slide[self.guide][0], self.sign * along)
+        return times(pose.by[j].slide[self.guide][0], self.sign * pose.rail(self.guide))
 
 
 def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:

@@ -1,4 +1,4 @@
-"""Newton-Raphson on loop closure, for the groups with no closed form and for all loops at once.
+"""Newton-Raphson on loop closure, for the groups with no closed form and for all loops at once; zeros in brackets.
 
 x_{k+1} = x_k − Φ⁻¹ f(x_k), on every pose of a block together; a step that would not reduce the gap is halved. Gaps f, their
 Jacobian Φ and each step come from tapes (`group_loops`).
@@ -12,6 +12,8 @@ J. Math. Anal. Appl. 96 (1983) 463).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,8 @@ from virtualwork.formulas.positions import State
 
 # of Gauss-Newton to a double root, from half of the digits
 ROUNDS = 4
+# of a bracket, at most
+HALVINGS = 80
 # of the mechanism's size, or of a slide that runs beyond it: a loop with a smaller gap is closed
 CLOSED = 1e-12
 # rad: eight roundings of an angle this large are as much
@@ -57,6 +61,35 @@ def newton(
         turned = sum(abs(f) * np.abs(x[:, j]) for j, f in loops.group.shares.get(tie.body, {}).items())
         far = np.maximum(far, turned * (size / MANY))
     return x, np.asarray((gap <= CLOSED * far) & loops.stands(st))
+
+
+def bracketed(
+    at: Callable[[Reals], tuple[Reals, Reals | None]], low: Reals, high: Reals, below: Reals | float, x: Reals
+) -> Reals:
+    """Zeros of one number in brackets, all at once, from x on: Newton's step where it stays inside, else the middle.
+
+    `at` gives values and slopes, or no slopes; `below` is the sign at the lower end.
+
+    >>> ends = np.array([0.0, 3.0]), np.array([3.0, 5.0])
+    >>> bracketed(lambda x: (np.cos(x), -np.sin(x)), *ends, np.array([1.0, -1.0]), sum(ends) / 2) / np.pi
+    array([0.5, 1.5])
+    """
+    a, b = low, high
+    for _ in range(HALVINGS):
+        value, slope = at(x)
+        left = np.sign(value) == below
+        a, b = np.where(left, x, a), np.where(left, b, x)
+        step = (a + b) / 2
+        if slope is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                newton = x - value / slope
+            step = np.where((newton > a) & (newton < b), newton, step)
+            step = np.where(value == 0, x, step)
+        near = (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), high - low)).all()
+        x = step
+        if near:
+            break
+    return np.asarray(x)
 
 
 def settle(loops: Loops, st: State, x: Reals, size: float) -> Reals:

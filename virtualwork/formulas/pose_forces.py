@@ -1,4 +1,14 @@
-"""The forces of one pose: effort by virtual work, joint forces, sums of loads; of floats, or of recorded numbers.
+"""The forces of one pose: effort by virtual work, joint forces by Newton and Euler, sums of loads; of floats, or of recorded numbers.
+
+The velocity coefficients are the virtual displacements: for a unit of input j every point moves by K_j = ∂P/∂q_j and every link turns
+by κ_j = ∂θ/∂q_j, so that by d'Alembert's principle (Riul, unit II, eqs. 3 and 5, divided by the input's own displacement)
+
+    τ_j + Σ F·K_j + Σ T κ_j = 0,      F, T with the inertia loads −m a_G and −I α.
+
+Joint forces do no work and do not appear. Every K_j is Σ i z e^{iθ} κ_j over the links between the ground and the point. The effort
+gathers the loads by links first, Q_θ = Σ T + Σ (z e^{iθ}) × F, and is −Σ Q_θ κ_j; the ledger takes the loads one by one.
+
+How joint forces follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become numbers.
 
 What a tape does not solve enters it. The friction of each contact (`friction 0`, `friction 1` …: the torque of a pin, the force
 along a guide) is exchanged for the forces that the contacts bear until the two fit (`friction`). A system whose rank is not known,
@@ -10,11 +20,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import cached_property
-from typing import Any
 
 from dalembert.arithmetic.recorded import bare
 from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.force_terms import Combination
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loaded_pose import LoadedPose, Shared, Table
@@ -23,8 +32,9 @@ from virtualwork.formulas.numbers import WRITTEN, Number, dot, minus, plus, time
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.quantity import Quantity, Recording
 from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.reactions import JointForces
 from virtualwork.formulas.statics import Column, equations, mesh_column, unknowns
+from virtualwork.plan.joint_forces import Side
+from virtualwork.plan.steps import Joint
 
 # a rate of a contact beside those of all links that is rounding alone, also where the pose is ill-conditioned
 AT_REST = 2.0**-40
@@ -36,7 +46,8 @@ class PoseForces:
     Attributes
     ----------
     paths : LoadPaths
-    joints : JointForces
+    order : Order
+        In which order the joint forces follow from each other.
     pose : LoadedPose
         The pose as the loads see it.
     formed : dict of quantity to its value
@@ -61,7 +72,7 @@ class PoseForces:
     ) -> None:
         self.paths, self.case, self.mechanism = paths, paths.case, paths.mechanism
         self.pose, self.solve, self.system_of, self.enter = pose, solve, system, enter
-        self.joints = JointForces(paths)
+        self.order = paths.order
         self.formed: dict[Quantity, Number] = {}
         self._placed = False
         pose.drive = lambda j: self.efforts[j]
@@ -70,12 +81,12 @@ class PoseForces:
             self.solve_places()
         for n, (joint, *_) in enumerate(self.case.contacts):
             rub = enter(f"friction {n}")
-            pose.friction[n] = rub if joint.guide is None else rub * self.joints.rail(pose, joint.guide)
+            pose.friction[n] = rub if joint.guide is None else rub * pose.rail(joint.guide)
 
     @property
     def redundant(self) -> bool:
         """Whether statics cannot give every joint force, so that unknown ones enter."""
-        return bool(self.joints.redundant)
+        return self.order.redundant
 
     def solve_places(self) -> None:
         """Solve what the places of all joints depend on, once."""
@@ -110,14 +121,29 @@ class PoseForces:
         return self.pose.kind.select(abs(rate) - least, rate, 0.0)
 
     def generalized(self, j: int) -> Number:
-        value = generalized_force(self.paths, self.pose, j)
-        return 0.0 if value is None else -bare(value)
+        total: Number = None
+        for body, guide, load in self.paths.working:
+            moved = self.pose.by[j].slide[guide][0] if body is None else self.pose.turning(body, j)
+            # what cannot move is not evaluated
+            if moved is not None:
+                value = self._value(load)
+                total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
+        return 0.0 if total is None else -bare(total)
 
     def newton_euler(self, j: int) -> Number:
+        """By ΣM = 0 of the driven link, or the force along the slide."""
+        entry = self.mechanism.inputs[j]
         if self.redundant:
-            return self._bears("force" if self.mechanism.inputs[j].is_slide else "torque", str(j))
+            return self._bears("force" if entry.is_slide else "torque", str(j))
         self.solve_places()
-        return self.joints.effort(self.pose, j)
+        if not entry.is_slide:
+            return self._value(self.paths.couple("input", j))
+        guide = self.mechanism.guide_of(entry)
+        value = self._side((f"guide:{guide}", self.mechanism.guides[guide].link))
+        value = None if value is None else dot(value, self.pose.rail(guide))
+        for mesh in self.order.racks.get(guide, ()):
+            value = minus(value, self.mesh(mesh))
+        return value
 
     def shaking(self) -> tuple[Number, Number]:
         return resultant(shaking_loads(self.case.loads), self.pose)
@@ -137,68 +163,124 @@ class PoseForces:
     # --- joints -----------------------------------------------------------------------------------------------------
     def rail(self, guide: int) -> Number:
         self.solve_places()
-        return self.joints.rail(self.pose, guide)
+        return self.pose.rail(guide)
+
+    def _value(self, terms: Combination) -> Number:
+        return self.paths.value(self.pose, terms)
+
+    def _side(self, side: Side) -> Number:
+        """The force of a joint on a body, complex, as the equilibrium of bodies and pins has it; None where it is zero throughout."""
+        joint, body = side
+        self.pose.names.add(f"{joint} on {body}")
+        return self._value(self.paths.side(side))
 
     def force(self, joint: str, body: str) -> Number:
+        """The force of a joint on a body, without the force of an input that drives it."""
         self.solve_places()
-        of, pose = self.joints, self.pose
-        at = of.by_key[joint]
+        at = self.order.by_key[joint]
+        guide = at.guide
         if not self.redundant:
-            return of.joint_force(pose, at, body)
-        if at.guide is not None:
-            sign = 1.0 if body == self.mechanism.guides[at.guide].link else -1.0
-            across = (sign * self._bears("normal", joint)) * (1j * of.rail(pose, at.guide))
-            return plus(across, of.rubbed(pose, at, body))
-        if body == GROUND:
+            value = self._side((joint, body))
+            if guide is not None and value is not None and self.order.is_pushed(guide):
+                # along a driven guide the joint's own equilibrium leaves the effort, which is a result of its own, or a tooth force
+                rail = self.pose.rail(guide)
+                value = value - dot(value, rail) * rail
+        elif guide is not None:
+            sign = 1.0 if body == self.mechanism.guides[guide].link else -1.0
+            value = (sign * self._bears("normal", joint)) * (1j * self.pose.rail(guide))
+        elif body == GROUND:
             return -sum((self.force(joint, other) for other in at.bodies if other != GROUND), 0j)
-        force = self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
-        return plus(force, of.borne(pose, at, body, self._tooth))
+        else:
+            value = self._bears("fx", joint, body) + 1j * self._bears("fy", joint, body)
+        return plus(plus(value, self._borne(at, body)), self._rubbed(at, body))
+
+    def _borne(self, joint: Joint, body: str) -> Number:
+        """What the bearing of a rack's wheel bears of the tooth force, on one body."""
+        total: Number = None
+        for guide, meshes in self.order.racks.items() if joint.guide is None else ():
+            for mesh in meshes:
+                if self.order.meshing(mesh) != joint.name:
+                    continue
+                wheel, carrier = self.mechanism.meshes[mesh].wheel, self.mechanism.guides[guide].on
+                if body in (wheel, carrier):
+                    force = times(self.pose.rail(guide), self.mesh(mesh))
+                    total = plus(total, force) if body == wheel else minus(total, force)
+        return total
+
+    def _rubbed(self, joint: Joint, body: str) -> Number:
+        """The friction force along a guide belongs to its reaction."""
+        total: Number = None
+        for load in self.case.friction:
+            if load.path is None or load.joint != joint.key:
+                continue
+            # no load stands there: it feels the reverse of the other body's
+            if body == GROUND:
+                total = minus(total, load.form(self.pose))
+            elif load.body == body:
+                total = plus(total, load.form(self.pose))
+        return total
 
     def moment(self, joint: str, body: str) -> Number:
+        """The moment of a joint on a body about its point: a guide's, or a pin's friction."""
         self.solve_places()
-        of, pose = self.joints, self.pose
-        guide, value = of.by_key[joint].guide, None
-        if guide is not None and not self.redundant:
-            value = of.guide_moment(pose, guide, body)
-        elif guide is not None and self.mechanism.guides[guide].is_slider:
-            value = plus(self._bears("moment", joint), of.beside(pose, guide, self._tooth))
-            value = value if body == self.mechanism.guides[guide].link else -value
+        guide, value = self.order.by_key[joint].guide, None
+        if guide is not None and self.mechanism.guides[guide].is_slider:
+            own = (
+                self._bears("moment", joint)
+                if self.redundant
+                else self._value(self.paths.couple("guide", guide))
+            )
+            value = plus(own, self._beside(guide))
+            value = value if value is None or body == self.mechanism.guides[guide].link else -value
         for load in self.case.friction:
             if load.path is None and load.joint == joint and load.body == body:
-                value = plus(value, load.form(pose))
+                value = plus(value, load.form(self.pose))
         return value
 
+    def _beside(self, guide: int) -> Number:
+        """The load of a guide whose link teeth push, off the guide's line: at the pitch point of the wheel."""
+        g, m = self.mechanism.guides[guide], self.mechanism
+        total: Number = None
+        for mesh in self.order.racks.get(guide, ()):
+            pin, rack = self.order.meshing(mesh), m.meshes[mesh].rack
+            if pin and rack is not None:
+                off = m.bodies[g.on][pin] - m.through(g)
+                across = dot(1j * self.paths.plan.directions[guide], off) - rack.radius
+                total = plus(total, times(across, self.mesh(mesh)))
+        return total
+
     def contact(self, cam: int) -> Number:
+        """How hard a cam presses on its follower along the normal; below zero it would have to pull."""
         self.solve_places()
-        self.solve(self.paths.touches.every[cam].targets, 0)
-        push = self._bears("contact", str(cam)) if self.redundant else None
-        return self.joints.contact(self.pose, cam, push)
+        touch = self.paths.touches.every[cam]
+        self.solve(touch.targets, 0)
+        push = self._bears("contact", str(cam)) if self.redundant else self._value(self.paths.push(touch))
+        return times(times(touch.drive.cam.sign, abs(touch.at(self.pose.st).unit())), push)
 
     def mesh(self, mesh: int) -> Number:
+        """The tooth force of a rack along its slide, positive on the link of the guide; the torque of a gear or a belt."""
         self.solve_places()
         if self.redundant:
             return self._bears(*mesh_column(self.mechanism, mesh))
         of = self.mechanism.meshes[mesh]
-        if of.guide is not None:
-            return self.joints.tooth(self.pose, mesh)
-        return self.paths.value(self.pose, self.paths.couple(of.kind, mesh))
+        return self._value(self.paths.couple(of.kind, mesh) if of.guide is None else self.paths.tooth(mesh))
 
     def tooth_place(self, mesh: int) -> Number:
         self.solve_places()
         of, bodies = self.mechanism.meshes[mesh], self.mechanism.bodies
         assert of.guide is not None
         assert of.rack is not None
-        guide, pin = self.mechanism.guides[of.guide], self.joints.meshing(mesh)
+        guide, pin = self.mechanism.guides[of.guide], self.order.meshing(mesh)
         # the wheel turns on a pin of the guide's body, or rolls along it
         body, point, side = (of.wheel, pin, -1j) if pin else (guide.link, guide.point, 1j)
         axis = self.pose.position(self.case.path(body, bodies[body][point]))
-        return plus(axis, times(side * of.rack.radius, self.joints.rail(self.pose, of.guide)))
+        return plus(axis, times(side * of.rack.radius, self.pose.rail(of.guide)))
 
     # --- redundant statics ------------------------------------------------------------------------------------------
     @cached_property
     def unknowns(self) -> list[Column]:
         """The joint forces and torques that enter where statics is redundant."""
-        return unknowns(self.joints)
+        return unknowns(self.order)
 
     @cached_property
     def system(self) -> dict[tuple[int, int | None], Number]:
@@ -207,7 +289,7 @@ class PoseForces:
         for touch in self.paths.touches.every:
             self.solve(touch.targets, 0)
         entries: dict[tuple[int, int | None], Number] = {}
-        for row, column, part in equations(self.joints, self.pose):
+        for row, column, part in equations(self.paths, self.pose):
             entries[row, column] = entries.get((row, column), 0.0) + bare(part)
         return entries
 
@@ -216,9 +298,6 @@ class PoseForces:
         turns = kind == "contact" and self.mechanism.cam_drives[int(key)].guide is None
         return f * bare(self.mechanism.size) if turns or kind in ("moment", "gear", "torque") else f
 
-    def _tooth(self, _: Any, mesh: int) -> Number:
-        return self._bears(*mesh_column(self.mechanism, mesh))
-
     # --- friction ---------------------------------------------------------------------------------------------------
     def bearing(self, n: int) -> Number:
         self.solve_places()
@@ -226,11 +305,10 @@ class PoseForces:
         if self.redundant:
             force = self.force(joint.key, body)
         else:
-            force = self.joints.on_side(self.pose, (joint.key, body))
-            force = plus(force, self.joints.borne(self.pose, joint, body))
+            force = plus(self._side((joint.key, body)), self._borne(joint, body))
         if force is None or joint.guide is None:
             return force
-        return dot(force, 1j * self.joints.rail(self.pose, joint.guide))
+        return dot(force, 1j * self.pose.rail(joint.guide))
 
     def rubbing_rate(self, n: int) -> Number:
         self.solve_places()

@@ -110,8 +110,6 @@ class Poses:
         self.time: Reals | None = None
         # (c, n), or a function that gives it: the friction of each contact where joints of such a motion stick, else NaN
         self.held: Reals | Callable[[], Reals] | None = None
-        # whether nothing moves: the rates are those of virtual displacements
-        self.at_rest = False
         self._solved: list[tuple[Step, int]] = []
         # by order and input: which steps are carried on to it, by their identity
         self._done: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
@@ -152,7 +150,6 @@ class Poses:
 
         some = self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
         some.time = None if self.time is None else np.asarray(self.time)[which]
-        some.at_rest = self.at_rest
         if self.held is not None:
             some.held = self.holding[:, which]
         return some
@@ -339,41 +336,6 @@ class Poses:
 
     def taped(self, quantities: Sequence[Quantity]) -> list[Any]:
         """Quantities from the tape, of one pose too."""
-        raise NotImplementedError
-
-    @property
-    def recording(self) -> Any:
-        """The formulas, written down."""
-        raise NotImplementedError
-
-    @property
-    def friction_iterations(self) -> int:
-        """How often friction and joint forces were exchanged until they agreed."""
-        raise NotImplementedError
-
-    @property
-    def locked(self) -> NDArray[np.bool_]:
-        """(n,): poses in which friction locks the mechanism."""
-        raise NotImplementedError
-
-    @property
-    def statics(self) -> Any:
-        """All equilibrium equations at once, where the constraints are redundant."""
-        raise NotImplementedError
-
-    def place(self, table: Any) -> Reals:
-        """What the table of a load is over, (n,)."""
-        raise NotImplementedError
-
-    def formed(
-        self,
-        forms: Sequence[Callable[[Any], Number]],
-        kind: type,
-        targets: Iterable[str] = (),
-        order: int = 1,
-        name: str = "",
-    ) -> list[Any]:
-        """What forms make of the pose as the loads see it, from a tape, (n,) each."""
         raise NotImplementedError
 
     def by_floats(self, quantities: Sequence[Quantity]) -> list[Any]:

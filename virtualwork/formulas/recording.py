@@ -112,8 +112,8 @@ class Recording:
         self._values: dict[Quantity, Number] = {}
         # what tells where quantities cannot be had, by these and by whether loops may open
         self.doubts: dict[tuple[tuple[Quantity, ...], bool], tuple[Quantity, ...]] = {}
-        # tapes of what studies make of the pose
-        self.forms: dict[str, Tape] = {}
+        # what the friction of joints is solved from, once it is written
+        self.rubbing: Tape | None = None
         self._forces: PoseForces | None = None
         # how far the loops of groups without a closed form are from closing as they enter, m
         self.open_loops: dict[str, Number] = {}

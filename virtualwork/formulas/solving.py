@@ -6,7 +6,7 @@ branches meet, and at singular poses the groups' derivatives enter too (`formula
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import Outputs, run
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.recorded import bare
-from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.forces import Bearing, Effort, Entry
 from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.kinematics import AnglePartial
@@ -25,11 +23,9 @@ from virtualwork.formulas.numbers import (
     FAST,
     SINGULAR,
     Complexes,
-    Number,
     Reals,
     cross,
     determined,
-    leave_out,
     solve_columns,
 )
 from virtualwork.formulas.poses import Poses
@@ -40,7 +36,6 @@ from virtualwork.formulas.tapes import entered, recorded, taped
 from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.loaded_pose import LoadedPose
     from virtualwork.formulas.loads import Tabled
     from virtualwork.formulas.statics import Statics
 
@@ -75,61 +70,6 @@ class Solving(Poses):
         if not self.branch.settled:
             self.cover()
         return self._enter or bool(self.branch.folded)
-
-    def formed(
-        self,
-        forms: Sequence[Callable[[LoadedPose], Number]],
-        kind: type,
-        targets: Iterable[str] = (),
-        order: int = 1,
-        name: str = "",
-    ) -> list[Any]:
-        """What forms make of the pose as the loads see it, (n,) each: written down, and run; NaN where a pose is not assembled.
-
-        `targets`: what they depend on beyond the loads and the places of all joints, as `plan.Plan.needed` has it, with
-        derivatives up to an order. `name`: under which the tape of forms that are the same for all poses is kept.
-        """
-        recording, wanted = self.recording, tuple(targets)
-        doubts = self._singular([Effort(0)])
-        with recording.lock:
-            tape = recording.forms.get(name)
-            if tape is None:
-                tape = self._written(forms, wanted, order, doubts)
-                if name:
-                    recording.forms[name] = tape
-        rows = run(tape, self.entering(tape.inputs))
-        self._doubted(doubts, rows)
-        result: list[Any] = [np.empty(self.n, kind) for _ in forms]
-        for i, to in enumerate(result):
-            to.real = rows.get(f"{i} x", 0.0)
-            if kind is complex:
-                to.imag = rows.get(f"{i} y", 0.0)
-        apart = self._apart_of(doubts)
-        if apart is not None:
-            for to, value in zip(result, apart[1].formed(forms, kind, wanted, order, name), strict=True):
-                to[apart[0]] = value
-        if not self.assembled.all():
-            for to in result:
-                leave_out(to, ~self.assembled)
-        return result
-
-    def _written(
-        self,
-        forms: Sequence[Callable[[LoadedPose], Number]],
-        targets: tuple[str, ...],
-        order: int,
-        doubts: Sequence[Quantity],
-    ) -> Tape:
-        """The tape of what forms make of the pose, and of what tells where a group is singular."""
-        recording = self.recording
-        outputs = recording.outputs(doubts)
-        recording.forces.solve_places()
-        recording.solve(targets, order)
-        for i, form in enumerate(forms):
-            value = form(recording.forces.pose)
-            value = 0.0 if value is None else bare(value)
-            outputs |= {f"{i} x": value.real, f"{i} y": value.imag}
-        return recording.recorder.tape(outputs)
 
     def _apart_of(self, doubts: Sequence[Quantity]) -> tuple[NDArray[np.bool_], Self] | None:
         """The poses whose derivatives enter, by what tells where groups are singular: which, and these alone; None where there are none."""
@@ -188,9 +128,8 @@ class Solving(Poses):
         if not c:
             return np.zeros((0, self.n)), 0
         with recording.lock:
-            if "friction" not in recording.forms:
-                recording.forms["friction"] = written(recording, doubts)
-        tape, keys = recording.forms["friction"], [Bearing(k) for k in range(c)]
+            tape = recording.rubbing = recording.rubbing or written(recording, doubts)
+        keys = [Bearing(k) for k in range(c)]
 
         def bears(friction: Reals) -> Complexes:
             return np.reshape(self._raw(keys, friction), (c, self.n))
@@ -239,7 +178,7 @@ class Solving(Poses):
         if apart is not None:
             for value, again in zip(entries.values(), apart[1]._raw(keys), strict=True):
                 value[apart[0]] = again
-        return Statics(forces.joints, entries, self.n, self.lock)
+        return Statics(forces.order, entries, self.n, self.lock)
 
     def _doubts(self, keys: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
         """The quantities that show where others have no value, or none from the tape."""
@@ -379,7 +318,7 @@ class Solving(Poses):
         from virtualwork.formulas.loaded_pose import Setting
 
         spring = self.branch.mechanism.torsion_springs[number]
-        setting = Setting(self, at_rest=False)
+        setting = Setting(self)
         self.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"))
         return self.over(lambda st: setting.twist(st, spring))  # type: ignore[no-any-return]
 
@@ -395,8 +334,6 @@ class Solving(Poses):
             return self.inputs[:, 0]
         if table.axis == "time":
             return np.asarray(table.timed(self.time))
-        if table.axis == "speed" and self.at_rest:
-            return np.zeros(self.n)
         if table.axis == "speed":
             return self.angle(table.body, 1)
         known = self.branch.plan.angles[table.body]

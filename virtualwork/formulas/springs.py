@@ -34,9 +34,6 @@ class SpringSide(Load):
     def form(self, pose: LoadedPose) -> Number:
         return plus(self.pull(pose), self.damped(pose))
 
-    def elastic(self, pose: LoadedPose) -> Number:
-        return self.work(self.pull(pose), self.displacement(pose, 0)) if self.carries else None
-
     def wasted(self, pose: LoadedPose, j: int) -> Number:
         return self.work(self.damped(pose), self.displacement(pose, j)) if self.carries else None
 

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loaded_pose import LoadedPose
 from virtualwork.formulas.numbers import Number, Reals, cross, imaginary_part, real_part
-from virtualwork.formulas.reactions import JointForces
+from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Joint
 
 # ("fx" or "fy", joint, body), ("normal", joint, ""), ("moment", joint, ""), ("gear", number, ""), ...
@@ -30,7 +31,7 @@ Column = tuple[str, str, str]
 NULL = 1e-9
 
 
-def unknowns(of: JointForces) -> list[Column]:
+def unknowns(of: Order) -> list[Column]:
     """The joint forces and torques of a mechanism."""
     unknowns: list[Column] = []
     for joint in of.joints:
@@ -54,13 +55,13 @@ def mesh_column(m: Description, mesh: int) -> Column:
     return "gear" if m.meshes[mesh].guide is None else "tooth", str(mesh), ""
 
 
-def equations(of: JointForces, pose: LoadedPose) -> Iterator[tuple[int, int | None, Number]]:
+def equations(paths: LoadPaths, pose: LoadedPose) -> Iterator[tuple[int, int | None, Number]]:
     """What each equation holds at a pose: its row, the unknown (None: what acts), and the real factor.
 
     Three for each link, ΣF and ΣM about its centre of mass, then two for each pin that is not on the ground. Moments
     and torques are divided by the size. Parts of one entry may come one after the other.
     """
-    m, size = of.mechanism, of.mechanism.size
+    m, size, of = paths.mechanism, paths.mechanism.size, paths.order
     links = list(m.links)
     column = {unknown: i for i, unknown in enumerate(unknowns(of))}
 
@@ -75,8 +76,16 @@ def equations(of: JointForces, pose: LoadedPose) -> Iterator[tuple[int, int | No
         if body != GROUND:
             yield 3 * links.index(body) + 2, column[unknown], factor
 
+    def arm(side: Side) -> Number:
+        """Where a joint's force acts, from the body's centre of mass, in ground axes."""
+        body = side[1]
+        z, guide, direction = paths.place(side)
+        z -= m.rigid[body].center
+        return (z if guide is None else z + direction * pose.st.slide[guide]) * pose.st.turn[body] + 0j
+
     for i, body in enumerate(links):
-        force, moment = of.force(pose, body, touched=False), of.moment(pose, body, touched=False)
+        force = paths.force(body, touched=False).value(pose)
+        moment = paths.moment(body, m.rigid[body].center, touched=False).value(pose)
         if force is not None:
             yield 3 * i, None, real_part(force)
             yield 3 * i + 1, None, imaginary_part(force)
@@ -86,22 +95,22 @@ def equations(of: JointForces, pose: LoadedPose) -> Iterator[tuple[int, int | No
         if joint.guide is None:
             for body in joint.bodies:
                 if body != GROUND:
-                    arm = of.place(pose, (joint.key, body)) + 0j
-                    yield from put(body, ("fx", joint.key, body), 1 + 0j, arm)
-                    yield from put(body, ("fy", joint.key, body), 1j, arm)
+                    at = arm((joint.key, body))
+                    yield from put(body, ("fx", joint.key, body), 1 + 0j, at)
+                    yield from put(body, ("fy", joint.key, body), 1j, at)
             continue
         g = m.guides[joint.guide]
-        rail = of.rail(pose, joint.guide) + 0j
+        rail = pose.rail(joint.guide) + 0j
         for body, sign in ((g.link, 1.0), (g.on, -1.0)):
             if body == GROUND:
                 continue
-            arm = of.place(pose, (joint.key, body)) + 0j
-            yield from put(body, ("normal", joint.key, ""), sign * 1j * rail, arm)
+            at = arm((joint.key, body))
+            yield from put(body, ("normal", joint.key, ""), sign * 1j * rail, at)
             if g.is_slider:
                 yield from turn(body, ("moment", joint.key, ""), sign)
             j = m.driver_of(joint.guide)
             if j is not None:
-                yield from put(body, ("force", str(j), ""), sign * rail, arm)
+                yield from put(body, ("force", str(j), ""), sign * rail, at)
     for i, mesh in enumerate(m.meshes):
         # the tooth force of a rack, or the torque of a gear over the size
         unit = 1.0 if mesh.guide is None else size
@@ -109,20 +118,20 @@ def equations(of: JointForces, pose: LoadedPose) -> Iterator[tuple[int, int | No
             yield from turn(body, mesh_column(m, i), factor / unit)
         if mesh.guide is not None:
             g = m.guides[mesh.guide]
-            rail = of.rail(pose, mesh.guide) + 0j
+            rail = pose.rail(mesh.guide) + 0j
             for body, sign in ((g.link, 1.0), (g.on, -1.0)):
                 if body != GROUND:
-                    arm = of.place(pose, (f"guide:{mesh.guide}", body)) + 0j
-                    yield from put(body, mesh_column(m, i), sign * rail, arm)
-    for touch in of.paths.touches.every:
+                    at = arm((f"guide:{mesh.guide}", body))
+                    yield from put(body, mesh_column(m, i), sign * rail, at)
+    for touch in paths.touches.every:
         # along the follower's coordinate, of an arm a torque over the size
         here = touch.at(pose.st)
         push = here.unit() * (1.0 if touch.drive.guide is not None else size)
         for body in links:
-            for sign in (sign for other, sign in of.paths.touches.on(body) if other is touch):
-                center = pose.st.at(of.paths.case.path(body, m.rigid[body].center))
-                arm = touch.axis(pose.st) - center + here.place()
-                yield from put(body, ("contact", str(touch.drive.number), ""), sign * push, arm)
+            for sign in (sign for other, sign in paths.touches.on(body) if other is touch):
+                center = pose.st.at(paths.case.path(body, m.rigid[body].center))
+                at = touch.axis(pose.st) - center + here.place()
+                yield from put(body, ("contact", str(touch.drive.number), ""), sign * push, at)
     for j, entry in enumerate(m.inputs):
         if not entry.is_slide:
             yield from turn(str(entry.link), ("torque", str(j), ""), 1.0)
@@ -133,7 +142,7 @@ def equations(of: JointForces, pose: LoadedPose) -> Iterator[tuple[int, int | No
                 yield 3 * len(links) + 2 * p + axis, column[key, joint.key, body], 1.0
 
 
-def _free_pins(of: JointForces) -> list[Joint]:
+def _free_pins(of: Order) -> list[Joint]:
     return [joint for joint in of.joints if joint.guide is None and GROUND not in joint.bodies]
 
 
@@ -149,11 +158,11 @@ class Statics:
     """
 
     def __init__(
-        self, joints: JointForces, entries: Mapping[tuple[int, int | None], Any], n: int, lock: Lock
+        self, order: Order, entries: Mapping[tuple[int, int | None], Any], n: int, lock: Lock
     ) -> None:
-        self.joints, self.n, self.lock = joints, n, lock
-        self.mechanism = joints.mechanism
-        self.unknowns = unknowns(joints)
+        self.order, self.n, self.lock = order, n, lock
+        self.mechanism = order.mechanism
+        self.unknowns = unknowns(order)
         a, b = np.zeros((n, self.rows, len(self.unknowns))), np.zeros((n, self.rows))
         for (row, column), value in entries.items():
             if column is None:
@@ -165,7 +174,7 @@ class Statics:
     @cached_property
     def rows(self) -> int:
         """How many equations: three for each link, two for each pin that is not on the ground."""
-        return 3 * len(self.mechanism.links) + 2 * len(_free_pins(self.joints))
+        return 3 * len(self.mechanism.links) + 2 * len(_free_pins(self.order))
 
     @cached_property
     def solved(self) -> tuple[Reals, Reals]:
@@ -207,7 +216,7 @@ class Statics:
         free = [i for i in range(len(self.unknowns)) if size[i] > 1e-7]
         if not free:
             return []
-        names = {joint.key: joint.name for joint in self.joints.joints}
+        names = {joint.key: joint.name for joint in self.order.joints}
 
         def label(unknown: Any) -> str:
             kind, key, body = unknown
@@ -221,7 +230,7 @@ class Statics:
                 return f"the tooth force of {self.mechanism.meshes[int(key)].label}"
             return f"the {kind} of {'input' if kind in ('force', 'torque') else 'gear'} {int(key) + 1}"
 
-        by_key = self.joints.by_key
+        by_key = self.order.by_key
 
         def at(axis: str, body: str, joined: bool) -> list[int]:
             """The open forces of an axis on a body, or of the joints it is `joined` by."""

@@ -159,7 +159,7 @@ class Placed:
             span = self.assembly.track.length
             ends = np.tile(self.assembly.mechanism.at, (2, 1))
             ends[:, 0] = min(low, q - span), max(high, q + span)
-            self._wound = *ends[:, 0].tolist(), Setting(Lanes(self.assembly, ends), False)
+            self._wound = *ends[:, 0].tolist(), Setting(Lanes(self.assembly, ends))
         return self._wound[2]
 
 

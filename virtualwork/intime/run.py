@@ -212,7 +212,7 @@ class Run:
         }
         table: dict[str, Any] = {"t_s": self.t, **inputs, "energy_J": self.energy}
         table |= moving_columns(m, self.motion.poses, 3)
-        pairs = self.first_motion.dynamics.reactions.order.pairs if forces else ()
+        pairs = self.first_motion.dynamics.reactions.pairs if forces else ()
         table |= force_columns(self.motion.dynamics, pairs)
         series = self.series(plain(table), ["t_s", *inputs], [JointForce.of(*pair) for pair in pairs])
         return moving_page(m.name, [series], time="t_s")

@@ -143,7 +143,7 @@ def forces(d: Dynamics, rows: Sequence[Row] | None = None, figure: FigureBase | 
     x, label = _input(d.poses)
     shown = [
         (row, size)
-        for row in (d.reactions.order.pairs if rows is None else rows)
+        for row in (d.reactions.pairs if rows is None else rows)
         if np.isfinite(size := np.abs(d.joint_force(row[0], row[1]))).any()
     ]
     tall = max(2.9, 0.17 * len(shown) + 0.8)

@@ -129,6 +129,26 @@ class Order:
             several or not square or not every or self.couples[1] is None or bool(self.plan.blocks.redundant)
         )
 
+    def is_pushed(self, guide: int) -> bool:
+        """Whether another part than the rail pushes along a guide: an input, a cam, or the teeth of a wheel that has a bearing."""
+        driven = self.mechanism.driver_of(guide) is not None
+        cam = any(drive.guide == guide for drive in self.mechanism.cam_drives)
+        return driven or cam or any(self.meshing(mesh) is not None for mesh in self.racks.get(guide, ()))
+
+    def meshing(self, mesh: int) -> str | None:
+        """Where the teeth of a rack's wheel act.
+
+        The name of the pin on which the wheel turns on the body that carries the rack's guide; "" where the wheel rolls
+        along a rack of that body; None where it is neither, and the tooth force is taken to act along the guide.
+        """
+        of = self.mechanism.meshes[mesh]
+        assert of.guide is not None
+        g = self.mechanism.guides[of.guide]
+        if of.wheel == g.link:
+            return ""
+        wheel, carrier = self.mechanism.bodies[of.wheel], self.mechanism.bodies[g.on]
+        return next((name for name in wheel if name in carrier), None)
+
     def couple(self, kind: str, i: int) -> dict[str, Any]:
         """How the torque of a guide, a gear or an input follows from what the bodies' ΣM leaves: body -> factor."""
         unknowns, factors = self.couples

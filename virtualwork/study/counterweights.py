@@ -14,8 +14,23 @@ from virtualwork.describe import AssemblyError, DescriptionError
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Moving
-from virtualwork.formulas.loaded_pose import LoadedPose
+from virtualwork.formulas.forces import Force
 from virtualwork.formulas.numbers import Complexes, Number, plus
+from virtualwork.formulas.pose_forces import PoseForces
+
+
+class Shaken(Force, kind="shaken"):
+    """The shaking force of inertia, N."""
+
+    is_rubbed = False
+    is_vector = True
+
+    def form(self, forces: PoseForces) -> Number:
+        total: Number = None
+        for load in forces.case.loads:
+            if load.kind == "inertia force":
+                total = plus(total, forces.pose.formed(load))
+        return total
 
 
 def pivot(mechanism: Description, link: str) -> complex:
@@ -62,15 +77,7 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
     dynamics, poses = motion.dynamics, motion.dynamics.poses
     if not dynamics.moves:
         raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")
-    inertia = [load for load in dynamics.case.loads if load.kind == "inertia force"]
-
-    def shaken(pose: LoadedPose) -> Number:
-        total: Number = None
-        for load in inertia:
-            total = plus(total, pose.formed(load))
-        return total
-
-    (before,) = dynamics.over([shaken], complex)
+    before = dynamics.value(Shaken())
     columns = []
     for link in links:
         z = pivot(poses.mechanism, link)

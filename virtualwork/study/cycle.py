@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from dalembert.arithmetic.guard import guarded
-from virtualwork.formulas.at_rest import potential
+from virtualwork.formulas.at_rest import Potential
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.loaded_pose import LoadedPose
-from virtualwork.formulas.loads import OWN
-from virtualwork.formulas.numbers import EPS, Number, Reals, minus, plus
-from virtualwork.plan.steps import path_reads
+from virtualwork.formulas.forces import Force
+from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.loads import Load
+from virtualwork.formulas.numbers import EPS, Number, Reals, plus
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.study.sweep import ALIKE, FINE, SAME, Sweep, largest
 
 # of the sweep: how far from its largest value the effort is compared; what falls less than so many times as much twice as far
@@ -257,25 +258,8 @@ class Cycle(Sweep):
     @cached_property
     def energy(self) -> tuple[Reals, Reals]:
         """Kinetic energy and potential of weights and springs at each pose, (n,) J."""
-        dynamics = self.motion.dynamics
-        rigid = self.poses.mechanism.rigid
-        centers = {body: dynamics.case.path(body, r.center) for body, r in rigid.items() if r.mass}
-        keys: set[str] = set()
-        for path in centers.values():
-            keys |= path_reads(path)
-
-        def kinetic(pose: LoadedPose) -> Number:
-            total: Number = None
-            for body, r in rigid.items():
-                if body in centers and (v := pose.velocity(centers[body])) is not None:
-                    total = plus(total, 0.5 * r.mass * (v.real * v.real + v.imag * v.imag))
-                if r.inertia and (w := pose.omega(body)) is not None:
-                    total = plus(total, 0.5 * r.inertia * w * w)
-            return total
-
-        stored = partial(potential, [load for load in dynamics.case.loads if load.stores])
-        moving, held = dynamics.over([kinetic, stored], float, sorted(keys))
-        return moving, held
+        kinetic, held = self.motion.dynamics.values([Kinetic(), Held()])
+        return kinetic, held
 
     @property
     def closure(self) -> float | None:
@@ -287,16 +271,7 @@ class Cycle(Sweep):
         speed, acceleration, _ = (rates[0] for rates in self.poses.rates)
         if not self.timed and (np.any(acceleration) or np.ndim(speed)):
             return None
-        dynamics = self.motion.dynamics
-
-        def work(pose: LoadedPose) -> Number:
-            total: Number = None
-            for load in dynamics.case.everything:
-                if load.kind not in OWN:
-                    total = plus(total, minus(load.power(pose, 0), load.elastic(pose)))
-            return total
-
-        total = self.effort + dynamics.over([work], float)[0]
+        total = self.effort + self.motion.dynamics.value(Wasted())
         kinetic, potential = self.energy
         gain = (kinetic[-1] - kinetic[0]) + (potential[-1] - potential[0])
         return self.integral(np.asarray(total * self._pace)) - float(gain)
@@ -347,6 +322,42 @@ class Cycle(Sweep):
             raise ValueError(self.reason)
         mean = float(speed) if speed.ndim == 0 else self.integral(speed) / self.span
         return self.fluctuation / (coefficient * mean * mean)
+
+
+# --- what its loads make of a pose --------------------------------------------------------------------------------------
+class Kinetic(Force, kind="kinetic energy"):
+    """The kinetic energy, J."""
+
+    is_rubbed = False
+
+    def form(self, forces: PoseForces) -> Number:
+        forces.solve_places()
+        pose, total = forces.pose, None
+        for body, r in forces.mechanism.rigid.items():
+            if r.mass and (v := pose.velocity(forces.case.path(body, r.center))) is not None:
+                total = plus(total, 0.5 * r.mass * (v.real * v.real + v.imag * v.imag))
+            if r.inertia and (w := pose.omega(body)) is not None:
+                total = plus(total, 0.5 * r.inertia * w * w)
+        return total
+
+
+class Held(Potential, kind="held"):
+    """The potential of weights and springs, J."""
+
+    def loads(self, case: LoadCase) -> list[Load]:
+        return [load for load in case.loads if load.stores]
+
+
+class Wasted(Force, kind="wasted"):
+    """The virtual work of applied loads, dampers and friction for a unit of the input."""
+
+    is_rubbed = False
+
+    def form(self, forces: PoseForces) -> Number:
+        total: Number = None
+        for load in forces.case.everything:
+            total = plus(total, load.wasted(forces.pose, 0))
+        return total
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.digits.balance import Balance
+from virtualwork.formulas.newton import bracketed
 from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.study.loads_at_rest import AROUND, Rest, goes_round, turns_of_loads, usual
 
@@ -274,7 +275,7 @@ def _one(assembly: Assembly, span: Reals, samples: int, turns: int | None) -> Eq
         rest = Rest(assembly, q[:, None])
         force, size = (values[:, 0] for values in rest.force())
         good = np.isfinite(force)
-    slope = rest.along(np.ones(1))
+    slope = rest.slope()
     # what the rounding of the terms, or of the input itself, makes of zero: the end of a range may be a root
     shift = 2 * EPS * np.abs(q * np.where(np.isfinite(slope), slope, 0.0))
     tiny = np.abs(force) <= 64 * EPS * size + shift
@@ -332,25 +333,14 @@ def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Re
 def _refine(
     assembly: Assembly, low: Reals, high: Reals, at_low: Reals, at_high: Reals, order: int = 0
 ) -> Reals:
-    """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: from the chord Newton's step where it stays inside."""
-    a, b, below = low.copy(), high.copy(), np.sign(at_low)
-    x = low + (high - low) * (at_low / (at_low - at_high))
-    for _ in range(80):
+    """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once, from the chord on."""
+
+    def at(x: Reals) -> tuple[Reals, Reals | None]:
         rest = Rest(assembly, x[:, None])
-        value = rest.force()[0][:, 0] if order == 0 else rest.along(np.ones(1))
-        left = np.sign(value) == below
-        a, b = np.where(left, x, a), np.where(left, b, x)
-        step = (a + b) / 2
-        if order == 0:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                newton = x - value / rest.along(np.ones(1))
-            step = np.where((newton > a) & (newton < b), newton, step)
-            step = np.where(value == 0, x, step)
-        near = (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), np.abs(high - low))).all()
-        x = step
-        if near:
-            break
-    return np.asarray(x)
+        return (rest.slope(), None) if order else (rest.force()[0][:, 0], rest.slope())
+
+    chord = low + (high - low) * (at_low / (at_low - at_high))
+    return bracketed(at, low, high, np.sign(at_low), chord)
 
 
 def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:

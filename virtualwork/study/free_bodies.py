@@ -5,7 +5,6 @@ Ibrahim §2.2 and §2.3, Riul, unit II, figures 3 to 5: loads, weights, joint fo
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.forces import (
+    Contact,
     Effort,
     JointForce,
     JointMoment,
@@ -24,8 +24,7 @@ from virtualwork.formulas.forces import (
     Rail,
     ToothPlace,
 )
-from virtualwork.formulas.kinematics import Point
-from virtualwork.formulas.touches import Touch
+from virtualwork.formulas.kinematics import ContactPlace, ContactWay, Point
 from virtualwork.plan.joint_forces import pairs
 
 if TYPE_CHECKING:
@@ -33,10 +32,11 @@ if TYPE_CHECKING:
 
     from virtualwork.describe.description import Description
     from virtualwork.formulas.load_case import LoadCase
-    from virtualwork.formulas.loaded_pose import LoadedPose
-    from virtualwork.formulas.numbers import Complexes, Number, Reals
+    from virtualwork.formulas.load_paths import LoadPaths
+    from virtualwork.formulas.numbers import Complexes, Reals
     from virtualwork.formulas.quantity import Quantity
-    from virtualwork.formulas.reactions import JointForces
+    from virtualwork.formulas.touches import Touches
+    from virtualwork.plan.joint_forces import Order
     from virtualwork.plan.steps import Joint
 
 SHORT = {
@@ -74,13 +74,14 @@ class Part(NamedTuple):
     at: Quantity | None
     sign: float
     along: Quantity | None = None
-    """Of a drive or of teeth along a guide: the direction of its effort."""
+    """Of a drive or of teeth along a guide, and of a cam: the direction of its effort."""
 
 
-def parts(case: LoadCase, of: JointForces) -> dict[str, list[Part]]:
-    """Return what acts on every link by the keys of its quantities, but for the contact forces of cams."""
-    result: dict[str, list[Part]] = {body: [] for body in of.mechanism.links}
-    for body, part in (*_loads(case), *_joints(case, of), *_meshes(of), *_drives(of.mechanism)):
+def parts(paths: LoadPaths) -> dict[str, list[Part]]:
+    """Return what acts on every link by the keys of its quantities."""
+    m, case, of = paths.mechanism, paths.case, paths.order
+    result: dict[str, list[Part]] = {body: [] for body in m.links}
+    for body, part in (*_loads(case), *_joints(case, of), *_meshes(of), *_drives(m), *_cams(paths.touches)):
         if body != GROUND:
             result[body].append(part)
     return result
@@ -95,7 +96,7 @@ def _loads(case: LoadCase) -> Iterator[tuple[str, Part]]:
             yield load.body, Part(name, load.kind, Load(i), LoadPlace(i), 1.0)
 
 
-def _joints(case: LoadCase, of: JointForces) -> Iterator[tuple[str, Part]]:
+def _joints(case: LoadCase, of: Order) -> Iterator[tuple[str, Part]]:
     m = of.mechanism
     rubbing = {joint.key for joint, *_ in case.contacts if joint.guide is None}
     for joint in of.joints:
@@ -166,7 +167,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
     >>> [(f.name, complex(f.force[0])) for f in body.forces], [(t.name, float(t.torque[0])) for t in body.torques]
     ([('W', -19.62j), ('O: ground', 19.62j)], [('T', 9.81)])
     """
-    m, poses, of = dynamics.poses.mechanism, dynamics.poses, dynamics.reactions
+    m, poses = dynamics.poses.mechanism, dynamics.poses
     result = {
         body: FreeBody(
             body,
@@ -177,7 +178,7 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
         )
         for body, link in m.links.items()
     }
-    for body, every in parts(dynamics.case, of).items():
+    for body, every in parts(dynamics.paths).items():
         for part in every:
             load, at, along = (_value(dynamics, key) for key in (part.key, part.at, part.along))
             load = part.sign * load if along is None else part.sign * load * along
@@ -185,14 +186,6 @@ def free_bodies(dynamics: Dynamics) -> list[FreeBody]:
                 result[body].forces.append(Force(part.name, part.kind, at, load))
             elif part.kind != "joint moment" or np.any(np.nan_to_num(load)):
                 result[body].torques.append(Torque(part.name, part.kind, load))
-    for number, touch in enumerate(of.paths.touches.every):
-        forms = partial(_normal, touch=touch), partial(_touching, touch=touch)
-        way, at = dynamics.over(forms, complex, touch.targets)
-        force = dynamics.contact(number) * way
-        cam = touch.drive.cam.cam
-        for body, other, sign in ((touch.body, cam, 1.0), (cam, touch.body, -1.0)):
-            if body != GROUND:
-                result[body].forces.append(Force(f"N: {other}", "contact force", at, sign * force))
     return list(result.values())
 
 
@@ -202,7 +195,14 @@ def _value(dynamics: Dynamics, key: Any) -> Any:
     return np.asarray(dynamics.value(key) if key.is_force else dynamics.poses.values((key,))[0])
 
 
-def _meshes(of: JointForces) -> Iterator[tuple[str, Part]]:
+def _cams(touches: Touches) -> Iterator[tuple[str, Part]]:
+    for number, touch in enumerate(touches.every):
+        cam, at, way = touch.drive.cam.cam, ContactPlace(number), ContactWay(number)
+        for body, other, sign in ((touch.body, cam, 1.0), (cam, touch.body, -1.0)):
+            yield body, Part(f"N: {other}", "contact force", Contact(number), at, sign, way)
+
+
+def _meshes(of: Order) -> Iterator[tuple[str, Part]]:
     """What gears and belts turn each of their links by; of racks the tooth force at the pitch point of the wheel."""
     m = of.mechanism
     for i, mesh in enumerate(m.meshes):
@@ -215,14 +215,3 @@ def _meshes(of: JointForces) -> Iterator[tuple[str, Part]]:
         # the wheel turns on the body of the guide, or rolls along it
         for body, sign in ((g.link, 1.0), (mesh.wheel if pin else g.on, -1.0)):
             yield body, Part("teeth", "tooth force", MeshForce(i), ToothPlace(i), sign, Rail(mesh.guide))
-
-
-def _normal(pose: LoadedPose, touch: Touch) -> Number:
-    """The direction in which a cam presses on its follower, a unit vector."""
-    unit = touch.at(pose.st).unit()
-    return touch.drive.cam.sign * unit / abs(unit)
-
-
-def _touching(pose: LoadedPose, touch: Touch) -> Number:
-    """Where a cam and its follower touch."""
-    return touch.axis(pose.st) + touch.at(pose.st).touch()

@@ -8,22 +8,17 @@ in fixed bearings none, and those normal to the displacement none (what follows 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.numbers import minus, times
+from virtualwork.formulas.forces import Force, Load, LoadTorque, Rail
+from virtualwork.formulas.numbers import Complexes, Number, Reals, minus, times
+from virtualwork.formulas.pose_forces import PoseForces
 from virtualwork.plan.joint_forces import pairs
-
-if TYPE_CHECKING:
-    from virtualwork.formulas.loaded_pose import LoadedPose
-    from virtualwork.formulas.loads import Load
-    from virtualwork.formulas.numbers import Complexes, Number, Reals
-    from virtualwork.formulas.reactions import JointForces
-    from virtualwork.plan.steps import Path
+from virtualwork.plan.steps import Path
 
 
 class Item(NamedTuple):
@@ -71,33 +66,51 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     unknown [9.81] works
     joint force [0.] at rest
     """
-    result = [_applied(dynamics, load, unit) for load in dynamics.case.everything]
+    result = [_applied(dynamics, i, unit) for i in range(len(dynamics.case.everything))]
     return [*result, *_drives(dynamics, unit), *_joints(dynamics, unit)]
 
 
-def _turning(pose: LoadedPose, body: str, unit: int | None) -> Number:
-    return pose.omega(body) if unit is None else pose.turning(body, unit)
+class Turning(Force, kind="turning"):
+    """The angular velocity of a body, rad/s, or ∂θ/∂q of one input (`unit`)."""
+
+    is_rubbed = False
+    body: str
+    unit: int | None
+
+    def form(self, forces: PoseForces) -> Number:
+        forces.solve_places()
+        of = forces.pose
+        return of.omega(self.body) if self.unit is None else of.turning(self.body, self.unit)
 
 
-def _velocity(
-    pose: LoadedPose, path: Path, unit: int | None, of: JointForces, rail: int | None = None
-) -> Number:
-    """The velocity of a point; on the `rail` of a guide of the material point under the slide, without the slide's own speed."""
-    result = pose.velocity(path) if unit is None else pose.coefficient(path, unit)
-    if rail is None:
-        return result
-    s = pose.slide_rate(rail) if unit is None else pose.by[unit].slide[rail][0]
-    return minus(result, times(s, of.rail(pose, rail)))
+class Moving(Force, kind="moving"):
+    """The velocity of a point, m/s, or ∂P/∂q of one input (`unit`).
+
+    On the `rail` of a guide that of the material point under the slide, without the slide's own speed.
+    """
+
+    is_rubbed = False
+    is_vector = True
+    path: Path
+    unit: int | None
+    rail: int | None
+
+    def form(self, forces: PoseForces) -> Number:
+        forces.solve_places()
+        pose, unit, rail = forces.pose, self.unit, self.rail
+        result = pose.velocity(self.path) if unit is None else pose.coefficient(self.path, unit)
+        if rail is None:
+            return result
+        s = pose.slide_rate(rail) if unit is None else pose.by[unit].slide[rail][0]
+        return minus(result, times(s, forces.rail(rail)))
 
 
-def _applied(dynamics: Dynamics, load: Load, unit: int | None) -> Item:
-    if load.path is None:
-        turning = partial(_turning, body=load.body, unit=unit)
-        value, rate = dynamics.over([load.form, turning], float)
-        return Item(load.body, load.kind, value, rate, turns=True)
-    velocity = partial(_velocity, path=load.path, unit=unit, of=dynamics.reactions, rail=load.rail)
-    value, rate = dynamics.over([load.form, velocity], complex)
-    return Item(load.body, load.kind, value, rate, turns=False)
+def _applied(dynamics: Dynamics, i: int, unit: int | None) -> Item:
+    load = dynamics.case.everything[i]
+    path = load.path
+    rate: Force = Turning(load.body, unit) if path is None else Moving(path, unit, load.rail)
+    value, moved = dynamics.values([LoadTorque(i) if path is None else Load(i), rate])
+    return Item(load.body, load.kind, value, moved, path is None)
 
 
 def _drives(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
@@ -107,47 +120,53 @@ def _drives(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
         if not entry.is_slide:
             for body, sign in ((str(entry.link), 1.0), (m.carrier(j), -1.0)):
                 if body != GROUND:
-                    (rate,) = dynamics.over([partial(_turning, body=body, unit=unit)], float)
+                    rate = dynamics.value(Turning(body, unit))
                     yield Item(body, "unknown", sign * effort[:, j], rate, turns=True)
             continue
         guide = m.guide_of(entry)
-        (rail,) = dynamics.over([partial(dynamics.reactions.rail, guide=guide)], complex)
-        g = m.guides[guide]
+        rail, g = dynamics.value(Rail(guide)), m.guides[guide]
         for body, sign in ((g.link, 1.0), (g.on, -1.0)):
             if body != GROUND:
-                rate = _at_guide(dynamics, guide, body, unit)
+                rate = dynamics.value(_at_guide(dynamics, guide, body, unit))
                 yield Item(body, "unknown", sign * effort[:, j] * rail, rate, turns=False)
 
 
-def _at_guide(dynamics: Dynamics, guide: int, body: str, unit: int | None) -> Complexes:
+def _at_guide(dynamics: Dynamics, guide: int, body: str, unit: int | None) -> Moving:
     """The velocity of a link's own point at a guide."""
     m = dynamics.poses.mechanism
     g = m.guides[guide]
-    path, rail = dynamics.case.path(g.link, m.bodies[g.link][g.point]), None if body == g.link else guide
-    (rate,) = dynamics.over(
-        [partial(_velocity, path=path, unit=unit, of=dynamics.reactions, rail=rail)], complex
-    )
-    return np.asarray(rate)
+    path = dynamics.case.path(g.link, m.bodies[g.link][g.point])
+    return Moving(path, unit, None if body == g.link else guide)
 
 
 def _joints(dynamics: Dynamics, unit: int | None) -> Iterator[Item]:
     """Every joint force once, and the moment of a slider: none of them does work."""
-    m, of = dynamics.poses.mechanism, dynamics.reactions
-    for joint, on, _ in pairs(of.joints):
+    m, case = dynamics.poses.mechanism, dynamics.case
+    for joint, on, _ in pairs(dynamics.reactions.joints):
         force = dynamics.joint_force(joint, on)
         if joint.guide is not None:
             rate = _at_guide(dynamics, joint.guide, on, unit)
         else:
-            path = dynamics.case.path(on, m.bodies[on][joint.name])
-            (rate,) = dynamics.over([partial(_velocity, path=path, unit=unit, of=of)], complex)
+            rate = Moving(case.path(on, m.bodies[on][joint.name]), unit, None)
         workless = "pair"
         if GROUND in joint.bodies:
             workless = "at rest" if joint.guide is None else "perpendicular to the displacement"
-        if joint.guide is not None and any(load.joint == joint.key for load in dynamics.case.friction):
+        if joint.guide is not None and any(load.joint == joint.key for load in case.friction):
             # its friction stands among the loads
-            (rail,) = dynamics.over([partial(of.rail, guide=joint.guide)], complex)
+            rail = dynamics.value(Rail(joint.guide))
             force = force - (force * np.conj(rail)).real * rail
-        yield Item(on, "joint force", force, rate, False, joint.name, workless)
+        yield Item(on, "joint force", force, dynamics.value(rate), False, joint.name, workless)
+
+
+class LoadWork(Force, kind="load work"):
+    """The virtual work of a load, by its number, for a unit of an input, N·m (or N for a slide)."""
+
+    is_rubbed = False
+    number: int
+    input: int
+
+    def form(self, forces: PoseForces) -> Number:
+        return forces.case.everything[self.number].power(forces.pose, self.input)
 
 
 def ledger(dynamics: Dynamics, j: int = 0) -> tuple[dict[str, Reals], list[str], list[str]]:
@@ -185,15 +204,15 @@ def ledger(dynamics: Dynamics, j: int = 0) -> tuple[dict[str, Reals], list[str],
     """
     done: dict[str, Reals] = {}
     workless: list[str] = []
-    pose, working = dynamics.pose, list["Load"]()
-    for load in dynamics.case.everything:
+    pose, every, working = dynamics.pose, dynamics.case.everything, list[LoadWork]()
+    for i, load in enumerate(every):
         if load.power(pose, j) is not None:
-            working.append(load)
+            working.append(LoadWork(i, j))
         elif load.displacement(pose, j) is None and load.name not in workless and load.carries:
             workless.append(load.name)
-    each = dynamics.over([partial(load.power, j=j) for load in working], float)
-    for load, value in zip(working, each, strict=True):
-        done[load.name] = done.get(load.name, 0.0) + value
+    for of, value in zip(working, dynamics.values(working), strict=True):
+        name = every[of.number].name
+        done[name] = done.get(name, 0.0) + value
     return done, [name for name in workless if name not in done], absent(dynamics)
 
 

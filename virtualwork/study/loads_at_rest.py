@@ -6,22 +6,16 @@ from the tape, with everything else that the search for equilibria asks of the s
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from functools import cached_property, partial
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations_with_replacement
 
 import numpy as np
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.limits import TURNED
-from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.at_rest import mass, mass_reads, potential, second_variation
-from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.at_rest import Mass, Potential, Stiffness, Work, WorkSize
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.loaded_pose import LoadedPose
-from virtualwork.formulas.numbers import EPS, Number, Reals, plus
-from virtualwork.plan.steps import path_reads
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.quantity import Quantity
 
 # steps of a turn in which usual loads are looked at
 AROUND = 72
@@ -33,105 +27,40 @@ class Rest:
     """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
 
     def __init__(self, assembly: Assembly, inputs: Reals) -> None:
-        self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
+        self.inputs, self.k = inputs, inputs.shape[1]
         self.poses = Lanes(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
-        self.loaded = Dynamics(self.poses, at_rest=True)
 
     def force(self) -> tuple[Reals, Reals]:
         """Q and the sum of the sizes of its terms, each (n, k)."""
-        force, size, *_ = self._values
-        return force, size
+        keys: list[Quantity] = [kind(j) for kind in (Work, WorkSize) for j in range(self.k)]
+        # over one input the search asks for these too, at the same poses
+        more = [Stiffness(0, 0), Potential()] if self.k == 1 else []
+        each = self.poses.taped([*keys, *more])
+        return np.stack(each[: self.k], axis=1), np.stack(each[self.k : 2 * self.k], axis=1)
 
-    @cached_property
-    def _values(self) -> list[Reals]:
-        """Q and the sum of the sizes of its terms, (n, k); of many poses over one input also ∂Q/∂q and V, (n,), from one tape."""
-
-        def of(j: int, sized: bool) -> Callable[[LoadedPose], Number]:
-            def form(pose: LoadedPose) -> Number:
-                total: Number = None
-                for load in self.loaded.case.loads:
-                    value = load.power(pose, j)
-                    total = plus(total, value if value is None or not sized else abs(value))
-                return total
-
-            return form
-
-        forms = [of(j, sized) for sized in (False, True) for j in range(self.k)]
-        if self._together:
-            more = self._bent, self._stored
-            each = self.loaded.over([*forms, *more], float, self._reads(), 2, name="rest")
-        else:
-            each = self.loaded.over(forms, float, name="rest")
-        return [*(np.stack(each[i : i + self.k], axis=1) for i in (0, self.k)), *each[2 * self.k :]]
-
-    @property
-    def _together(self) -> bool:
-        return self.k == 1 and self.loaded.on_tape
-
-    def _reads(self) -> list[str]:
-        """What the loads depend on."""
-        return sorted(set().union(*(load.reads() for load in self.loaded.case.loads)) - {f"angle:{GROUND}"})
-
-    def _bent(self, pose: LoadedPose) -> Number:
-        """The second variation of the work, along the direction of the rates."""
-        return second_variation(self.loaded.case.loads, pose, pose.along or pose.by[0])
-
-    def along(self, direction: Reals) -> Reals:
-        """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
-        if self._together:
-            return np.asarray(self._values[2] * direction[0] ** 2)
-        still: list[Number] = [0.0] * self.k
-        way = [direction.tolist(), still, still] if self.k > 1 else None
-        poses = self.poses.again(self.inputs, way)
-        poses.at_rest = True
-        loaded = Dynamics(poses, at_rest=True)
-        if loaded.on_tape:
-            (total,) = loaded.over([self._bent], float, self._reads(), 2, name="rest, second")
-        else:
-            total = np.array([self._along(loaded, self._reads())])
-        return np.asarray(total * (direction[0] ** 2 if self.k == 1 else 1.0))
-
-    def _along(self, loaded: Dynamics, reads: list[str]) -> float:
-        """The derivative of one pose along its rates; NaN at a singular pose."""
-        rates = loaded.along(reads)
-        if rates is None:
-            return math.nan
-        return float(second_variation(loaded.case.loads, loaded.pose, rates) or 0.0)
+    def slope(self) -> Reals:
+        """∂Q/∂q of the one input, (n,)."""
+        return np.asarray(-self.hessian()[:, 0, 0])
 
     def hessian(self) -> Reals:
-        """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
-        k = self.k
-        unit = np.eye(k)
-        out = np.zeros((len(self.inputs), k, k))
-        for i in range(k):
-            out[:, i, i] = -self.along(unit[i])
-        for i, j in combinations(range(k), 2):
-            both = -self.along(unit[i] + unit[j])
-            out[:, i, j] = out[:, j, i] = (both - out[:, i, i] - out[:, j, j]) / 2
-        return out
+        """V″, (n, k, k)."""
+        return self._matrix(Stiffness)
 
     def mass(self) -> Reals:
         """The generalized mass, (n, k, k)."""
+        return self._matrix(Mass)
+
+    def _matrix(self, kind: type[Mass | Stiffness]) -> Reals:
         pairs = list(combinations_with_replacement(range(self.k), 2))
-        case, out = self.loaded.case, np.zeros((len(self.inputs), self.k, self.k))
-        forms = [partial(mass, case, i=i, j=j) for i, j in pairs]
-        values = self.loaded.over(forms, float, mass_reads(case), name="rest, mass")
-        for (i, j), value in zip(pairs, values, strict=True):
+        out = np.empty((len(self.inputs), self.k, self.k))
+        for (i, j), value in zip(pairs, self.poses.taped([kind(i, j) for i, j in pairs]), strict=True):
             out[:, i, j] = out[:, j, i] = value
         return out
 
     def potential(self) -> Reals:
         """V, (n,) J; NaN where a load has no potential."""
-        if self._together:
-            return self._values[3]
-        keys = {
-            key for load in self.loaded.case.loads if load.path is not None for key in path_reads(load.path)
-        }
-        (result,) = self.loaded.over([self._stored], float, sorted(keys), name="rest, potential")
+        (result,) = self.poses.taped([Potential()])
         return np.asarray(result)
-
-    def _stored(self, pose: LoadedPose) -> Number:
-        return potential(self.loaded.case.loads, pose)
 
 
 def turns_of_loads(assembly: Assembly, j: int) -> int | None:

@@ -9,22 +9,21 @@ at its dead centre.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.dataclass import dataclass
 from virtualwork.branch.assembly import Assembly
-from virtualwork.formulas.kinematics import Angle, Point, Slide
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.newton import bracketed
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.formulas.quantity import Quantity
+from virtualwork.quantities import Component, links, points, slides
 
 SAMPLES = 720
 # what moves less than this, of the mechanism's size or of a radian, rests; at a limit of the input places are known to √ε
 RESTS, RESTS_AT_LIMITS = 1e-12, 4 * math.sqrt(EPS)
-ROUNDS = 60
 # periods of the loops within which all that turns beside them is looked for to come back
 PERIODS = 32
 # places nearer than this, in sizes of the mechanism or radians, are one
@@ -60,41 +59,13 @@ class Stroke:
         return self.most - self.least
 
 
-class _Place(NamedTuple):
-    """What may travel: its name, what poses compute for it, whether it is the y of a point."""
-
-    name: str
-    key: Quantity
-    imaginary: bool = False
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is an angle."""
-        return self.key.is_angle
-
-    def of(self, value: Any) -> Reals:
-        """The number from what poses computed."""
-        number = np.asarray(value)
-        return np.asarray(number.imag if self.imaginary else number.real)
-
-    def rate(self, order: int) -> Quantity:
-        """What poses compute for a derivative."""
-        return self.key.of_order(order)
-
-
-def _places(assembly: Assembly) -> list[_Place]:
+def _places(assembly: Assembly) -> list[Component]:
     """Slides, points and links, but for the input."""
     m = assembly.mechanism
     driven = m.inputs[0]
-    guides = {g.point: i for i, g in reversed(list(enumerate(m.guides)))}
-    places = [_Place(name, Slide(i, 0)) for name, i in guides.items() if name != driven.slider]
-    for name, (body, _) in m.points.items():
-        key = Point(body, 0j, name, 0)
-        places += [_Place(f"{name}.x", key), _Place(f"{name}.y", key, True)]
-    return [
-        *places,
-        *(_Place(f"{link}.angle", Angle(link, 0)) for link in m.links if link != driven.link),
-    ]
+    guided = [name for name in reversed(m.guided) if name != driven.slider]
+    turning = [link for link in m.links if link != driven.link]
+    return [*slides(m, guided, 0), *points(m, m.points, 0), *links(turning, 0)]
 
 
 def strokes(assembly: Assembly, limits: tuple[float, float] | None) -> tuple[Stroke, ...]:
@@ -139,7 +110,7 @@ def strokes(assembly: Assembly, limits: tuple[float, float] | None) -> tuple[Str
     return tuple(s for s in map(search.stroke, shown) if s is not None)
 
 
-def _periods(assembly: Assembly, shown: list[_Place], period: float) -> int:
+def _periods(assembly: Assembly, shown: list[Component], period: float) -> int:
     """How many periods of the loops bring back all that comes back: a planet's arm may need six turns of its sun."""
     q = period * (0.1234 + np.arange(PERIODS + 1))
     assembly.track.cover(0.0, float(q[-1]) + period)
@@ -147,7 +118,7 @@ def _periods(assembly: Assembly, shown: list[_Place], period: float) -> int:
     size = assembly.mechanism.size
     back = np.ones(PERIODS, dtype=bool)
     for each, place in zip(shown, poses.values([each.key for each in shown]), strict=True):
-        value = np.broadcast_to(np.exp(1j * place) if each.turns else place / size, q.shape)
+        value = np.broadcast_to(np.exp(1j * place) if each.in_degrees else place / size, q.shape)
         returns = np.abs(value[1:] - value[0]) <= ALIKE
         # what comes back at no time holds up nothing
         back &= returns if returns.any() else True
@@ -157,7 +128,7 @@ def _periods(assembly: Assembly, shown: list[_Place], period: float) -> int:
 class _Search:
     """Samples of the range, and what is looked for between them."""
 
-    def __init__(self, assembly: Assembly, q: Reals, shown: list[_Place], limited: bool) -> None:
+    def __init__(self, assembly: Assembly, q: Reals, shown: list[Component], limited: bool) -> None:
         self.assembly, self.length = assembly, assembly.mechanism.size
         self.q, self.limited = q, limited
         keys = dict.fromkeys(s.key for s in shown)
@@ -186,13 +157,13 @@ class _Search:
             return self.assembly.reach.in_period(q)
         return 0.0 if min(q, float(self.q[-1]) - q) < ALIKE else q
 
-    def stroke(self, shown: _Place) -> Stroke | None:
+    def stroke(self, shown: Component) -> Stroke | None:
         """The stroke of one quantity; None where it rests, or turns round."""
-        place, rate = (np.broadcast_to(shown.of(v), self.q.shape) for v in self.values[shown.key])
+        place, rate = (np.broadcast_to(shown.in_si(v), self.q.shape) for v in self.values[shown.key])
         good = np.isfinite(place)
         if not good.any():
             return None
-        turns = shown.turns
+        turns = shown.in_degrees
         if turns:
             place = place.copy()
             place[good] = np.unwrap(place[good])
@@ -206,7 +177,7 @@ class _Search:
         least, most = (self._extreme(shown, place, rate, good, sign) for sign in (-1, 1))
         base = 2 * math.pi * math.floor(least[0] / (2 * math.pi)) if turns else 0.0
         return Stroke(
-            shown.name,
+            shown.names[0].removesuffix(".position"),
             turns,
             least[0] - base,
             self._shown(least[1]),
@@ -216,7 +187,7 @@ class _Search:
 
     def _extreme(
         self,
-        shown: _Place,
+        shown: Component,
         place: Reals,
         rate: Reals,
         good: NDArray[np.bool_],
@@ -232,14 +203,14 @@ class _Search:
         candidates = [(float(height[i]), float(q[i])) for i in np.flatnonzero(height == height.max())]
         if len(tops):
             x = self._refined(shown, q[tops], q[tops + 1], sign)
-            values = shown.of(self._poses(x).values((shown.key,))[0])
+            values = shown.in_si(self._poses(x).values((shown.key,))[0])
             near = place[tops]
-            if shown.turns:
+            if shown.in_degrees:
                 values = near + np.angle(np.exp(1j * (values - near)))
             candidates += [(float(v), float(at)) for v, at in zip(sign * values, x, strict=True)]
         for i, end in zip((0, -1), self.ends, strict=False):
-            value, beside = float(shown.of(end[shown.key])), float(place[good][i])
-            if shown.turns:
+            value, beside = float(shown.in_si(end[shown.key])), float(place[good][i])
+            if shown.in_degrees:
                 value = beside + math.remainder(value - beside, math.tau)
             candidates.append((sign * value, float(q[i])))
         best = max(v for v, _ in candidates)
@@ -248,21 +219,12 @@ class _Search:
         value, at = min((pair for pair in candidates if pair[0] >= best - alike), key=lambda pair: pair[1])
         return sign * value, at
 
-    def _refined(self, shown: _Place, low: Reals, high: Reals, sign: int) -> Reals:
-        """Zeros of the rate in brackets, all at once: Newton's step where it stays inside, else the middle."""
-        a, b = low.copy(), high.copy()
-        x = (a + b) / 2
-        for _ in range(ROUNDS):
-            at = self._poses(x)
-            slope, bend = (sign * shown.of(at.values((shown.rate(k),))[0]) for k in (1, 2))
-            up = slope > 0
-            a, b = np.where(up, x, a), np.where(up, b, x)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                newton = x - slope / bend
-            step = np.where((newton > a) & (newton < b), newton, (a + b) / 2)
-            step = np.where(slope == 0, x, step)
-            done = bool((np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), high - low)).all())
-            x = step
-            if done:
-                break
-        return np.asarray(x)
+    def _refined(self, shown: Component, low: Reals, high: Reals, sign: int) -> Reals:
+        """Zeros of the rate in brackets, all at once."""
+
+        def at(x: Reals) -> tuple[Reals, Reals]:
+            poses = self._poses(x)
+            slope, bend = (sign * shown.in_si(poses.values((shown.key.of_order(k),))[0]) for k in (1, 2))
+            return slope, bend
+
+        return bracketed(at, low, high, 1.0, (low + high) / 2)

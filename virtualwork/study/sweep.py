@@ -16,7 +16,7 @@ from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.limits import TURNS
 from virtualwork.formulas.dynamics import Dynamics, Moving
 from virtualwork.formulas.numbers import Number, Reals
-from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.solving import Solving
 
 # poses of an interval in which a largest value is looked for; intervals that are looked into; rounds at most
 INSIDE, LOOKED, ROUNDS = 33, 4, 12
@@ -32,10 +32,10 @@ class Between:
 
     Attributes
     ----------
-    poses : Poses
+    poses : Solving
     """
 
-    def __init__(self, poses: Poses) -> None:
+    def __init__(self, poses: Solving) -> None:
         self.poses = poses
 
     @cached_property
@@ -61,7 +61,7 @@ class Between:
         )
         return law, law.derivative(), law.derivative(2)
 
-    def at(self, place: Reals) -> Poses:
+    def at(self, place: Reals) -> Solving:
         """The poses at other places, (m,)."""
         if self.poses.time is None:
             return self.poses.again(place[:, None], self.poses.rates)
@@ -157,7 +157,7 @@ class Sweep:
         return self.motion.dynamics.lock
 
     @property
-    def poses(self) -> Poses:
+    def poses(self) -> Solving:
         """The poses of the sweep."""
         return self.motion.dynamics.poses
 
