@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from balancing.dependence import columns_scaled
 from balancing.second_run import applied, chosen, damped, product, pseudo_inverse
 from dalembert.arithmetic.doubled import Doubled, doubled
+from dalembert.arithmetic.doubled_arrays import Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+from dalembert.arithmetic.doubled_operations import part, total
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -75,7 +76,7 @@ def exact_stored(mean: Vectors, covariance: Vectors) -> ExactPrior:
     root = Vectors.of(np.zeros(covariance.shape))
     for j in range(planes):
         for i in range(j, planes):
-            rest = covariance[:, i, j] - (root[:, i, :j] * root[:, j, :j].conj).total()
+            rest = covariance[:, i, j] - (root[:, i, :j] * root[:, j, :j].conj()).sum()
             if i == j:
                 # what is left in the rounding of 32 digits is nothing
                 some = rest.x.high > 1e-28 * covariance[:, j, j].x.high
@@ -92,7 +93,7 @@ def exact_stored(mean: Vectors, covariance: Vectors) -> ExactPrior:
 def exact_pooled(each: Vectors, covariances: Vectors) -> ExactPrior:
     """Pool the coefficients of sister machines, (m, s, p) and (m, s, p, p): `balancing.prior.pooled_prior`."""
     machines = float(len(each.x.high))
-    mean = each.total(0) / np.array(machines)
+    mean = each.sum(0) / np.array(machines)
     d = (each - mean[None]) / DOUBLED.sqrt(Doubled(np.array(machines - 1)))
     square = mean.square
     largest = float(square.high.max()) or 1.0
@@ -140,7 +141,7 @@ def exact_prior_fit(
     w = masses[..., None, :, :]
 
     def centred(rows: Vectors) -> Vectors:
-        mean = (rows * part(share, (..., None))).total(-2)
+        mean = (rows * part(share, (..., None))).sum(-2)
         return (rows - mean[..., None, :]) * part(root, (..., None))
 
     runs, planes = masses.shape[-2:]
@@ -188,7 +189,7 @@ def correction_deviations(
     ridge = doubled(ridge)
     inverse = pseudo_inverse(damped(ridge, a) if ridge.high else a)
     own = inverse[..., :channels] * part(root, (..., None, slice(None)))
-    m = product(inverse, inverse.swapped().conj)[..., :, None, :]
+    m = product(inverse, inverse.swapped().conj())[..., :, None, :]
     left = (initial + applied(alpha, corrections)) * w
     ones = Vectors.of(np.ones((*corrections.shape[:-1], 1)))
     linear = -(own[..., None] * Vectors.joined([ones, corrections], axis=-1)[..., None, None, :])
@@ -197,23 +198,23 @@ def correction_deviations(
         square = ridge * ridge
         pulled = alpha * given[..., None, :] * w[..., None] * square
         antilinear = antilinear - m * pulled[..., None, :, :]
-        back = alpha.conj * given[..., None, :] * w[..., None] * square
+        back = alpha.conj() * given[..., None, :] * w[..., None] * square
         linear[..., 1:] = linear[..., 1:] - m * back[..., None, :, :]
     size = given.size
     some = size.high > 0
-    turn = given.conj / chosen(some, size, 1.0)
+    turn = given.conj() / chosen(some, size, 1.0)
     turn = turn + Vectors.of((~some).astype(complex))
     squares = [Doubled(np.zeros(some.shape)) for _ in range(2)]
 
     def add(gain: Vectors, unit: Vectors | None, along: Doubled, across: Doubled) -> None:
         """Add the squares of what errors (..., s, n) bring, by the gain (..., s, 1 + p, n) of the unknowns."""
-        first = (linear[..., None] * gain[..., None, :, :, :]).total(-2)
-        second = (antilinear[..., None] * gain[..., None, :, 1:, :].conj).total(-2)
+        first = (linear[..., None] * gain[..., None, :, :, :]).sum(-2)
+        second = (antilinear[..., None] * gain[..., None, :, 1:, :].conj()).sum(-2)
         if unit is None:
             # the same errors in all channels
-            first, second = first.total(-2)[..., None, :], second.total(-2)[..., None, :]
+            first, second = first.sum(-2)[..., None, :], second.sum(-2)[..., None, :]
         else:
-            first, second = first * unit[..., None, :, :], second * unit[..., None, :, :].conj
+            first, second = first * unit[..., None, :, :], second * unit[..., None, :, :].conj()
         first, second = first * turn[..., None, None], second * turn[..., None, None]
         radial, aside = (first + second) * along, (first - second) * across
         for k, parts in enumerate(((radial.x, aside.y), (radial.y, aside.x))):

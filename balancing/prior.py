@@ -24,7 +24,7 @@ from balancing.run_log import Foreknown, JointFit
 from dalembert.arithmetic.records import record
 
 if TYPE_CHECKING:
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -247,7 +247,8 @@ def _again(plain: JointFit, prior: Prior, deviation: Real | None) -> Vectors:
     from balancing.log_again import ExactPrior, exact_fit, exact_prior_fit
     from balancing.second_run import chosen
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors, part
+    from dalembert.arithmetic.doubled_arrays import Vectors
+    from dalembert.arithmetic.doubled_operations import part
 
     present = plain.present
     readings, masses = Vectors.of(np.where(present, plain.readings, 0.0)), Vectors.of(plain.masses)

@@ -15,8 +15,9 @@ from balancing.dependence import roundings
 from balancing.influence import influence_coefficients
 from balancing.second_run import damped, smallest_squares
 from dalembert.arithmetic.doubled import Doubled, doubled
+from dalembert.arithmetic.doubled_arrays import Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import Vectors, part
+from dalembert.arithmetic.doubled_operations import part
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -53,7 +54,7 @@ def influence_error(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLi
     # (..., s, r)
     change = Vectors.of(np.swapaxes(v0[..., None, :] + 0 * v, -1, -2)) - Vectors.of(np.swapaxes(v, -1, -2))
     exact = smallest_squares(Vectors.of(t[..., None, :, :]), change)[0]
-    return exact.apart(influence_coefficients(v0, v, t))
+    return exact.off(influence_coefficients(v0, v, t))
 
 
 class Problem(NamedTuple):
@@ -77,7 +78,7 @@ class Problem(NamedTuple):
 
     def residual(self, corrections: Vectors) -> Vectors:
         """V + α w."""
-        return self.initial + (self.influence * corrections[..., None, :]).total()
+        return self.initial + (self.influence * corrections[..., None, :]).sum()
 
 
 def least_squares_again(problem: Problem, ridge: float | Doubled) -> Vectors:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
     from matplotlib.projections.polar import PolarAxes
 
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -198,12 +198,12 @@ class JointFit:
         >>> bool((fit.error_estimate() < 1e-14).all())
         True
         """
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         if self.foreknown is not None:
-            return self.foreknown.again().apart(self.unknowns)
+            return self.foreknown.again().off(self.unknowns)
         readings = Vectors.of(np.where(self.present, self.readings, 0.0))
-        return self.second_run(readings, Vectors.of(self.masses)).apart(self.unknowns)
+        return self.second_run(readings, Vectors.of(self.masses)).off(self.unknowns)
 
     def second_run(self, readings: Vectors, masses: Vectors) -> Vectors:
         """Return the unknowns (..., s, 1 + p) in 32 digits, of readings (..., r, s) and masses (..., r, p) in 32 digits.
@@ -212,8 +212,9 @@ class JointFit:
         """
         from balancing.second_run import smallest_squares
         from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.arithmetic.doubled_functions import DOUBLED
-        from dalembert.arithmetic.doubled_vectors import Vectors, part
+        from dalembert.arithmetic.doubled_operations import part
 
         weights = np.where(self.present, 1.0 if self.weights is None else self.weights, 0.0)
         of_rows = DOUBLED.sqrt(Doubled(np.swapaxes(weights, -1, -2)))
@@ -249,7 +250,7 @@ def _of_machine(again: Callable[[], Vectors], i: int) -> Vectors:
 
 
 def _without(again: Callable[[], Vectors], runout: Complex) -> Vectors:
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
     unknowns = again()
     unknowns[..., 0] = unknowns[..., 0] - Vectors.of(runout)

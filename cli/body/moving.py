@@ -17,7 +17,7 @@ from rigidbody3d.shaft import shaft_axes
 
 if TYPE_CHECKING:
     from balancing import Correction
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -238,7 +238,7 @@ class MovingBody:
         """The corrections to 32 digits, (p,)."""
         from balancing.second_run import ExactMasses
         from cli.read.exact import writtens
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         shaft: Any = self.second.shaft
         x, y = (shaft.unbalance_xy[..., i].doubled for i in range(2))
@@ -248,7 +248,7 @@ class MovingBody:
     def correction_errors(self) -> list[CorrectionMass]:
         """The errors of the masses of the correction planes."""
         from cli.read.exact import writtens
-        from dalembert.arithmetic.doubled_vectors import off
+        from dalembert.arithmetic.doubled_operations import off
 
         fix, exact = self.correction, self.exact_correction
         assert fix is not None

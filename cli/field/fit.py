@@ -334,8 +334,9 @@ class _Groups:
 def exact_fit(group: Group, runs: Runs, request: Request, stored: Stored | None) -> ExactFit:
     """Return the fit of a group in 32 digits, of readings, masses and coefficients as they are written."""
     from balancing import log_again
+    from dalembert.arithmetic.doubled_arrays import Vectors
     from dalembert.arithmetic.doubled_functions import hypot
-    from dalembert.arithmetic.doubled_vectors import Vectors, part
+    from dalembert.arithmetic.doubled_operations import part
 
     readings, masses, _ = group.in_32_digits
     present, freedom = group.fit.present, np.asarray(group.fit.degrees_of_freedom, dtype=float)
@@ -361,8 +362,9 @@ def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
     from balancing.log_again import ExactErrors
     from balancing.second_run import chosen
     from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_arrays import Vectors
     from dalembert.arithmetic.doubled_functions import DOUBLED
-    from dalembert.arithmetic.doubled_vectors import Vectors, part
+    from dalembert.arithmetic.doubled_operations import part
 
     readings = group.in_32_digits.readings
     if request.reading_error is None:

@@ -23,7 +23,7 @@ from dalembert.units import from_si, written
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Tables = dict[str, Callable[[], Table]]
 
@@ -186,7 +186,7 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
         return Doubled(*again()[2 * k : 2 * k + 2])
 
     def exact(k: int) -> Vectors:
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         return Vectors(doubled(2 * k), doubled(2 * k + 1))
 
@@ -224,7 +224,7 @@ class SecondRun:
     @cached_property
     def initial(self) -> Vectors:
         """The vibration without masses, run-out off, (g, s)."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         runout, exact = Vectors.of(self.balancing.runout(self.group)), self.balancing.runs.exact_runout
         if exact is not None:
@@ -240,7 +240,7 @@ class SecondRun:
         """The vibration where the corrections start from, (g, s)."""
         if not self.solved.start.any():
             return self.initial
-        return self.initial + (self.alpha * self.standing[:, None, :]).total()
+        return self.initial + (self.alpha * self.standing[:, None, :]).sum()
 
     @property
     def alpha(self) -> Vectors:
@@ -262,7 +262,7 @@ class SecondRun:
             exact, _ = whole.second_run(self.alpha, self.here, self.ridge)
             assert exact is not None
             return exact
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         result = Vectors.of(np.full(solved.corrections.shape, complex(np.nan, np.nan)))
         ceiling = None if objective.max_residual is None or objective.minimax else objective.max_residual

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 
 METHOD = (
@@ -171,7 +171,7 @@ class SecondRun:
     def target(self) -> Vectors:
         """The sum of the corrections."""
         from cli.read.exact import vectors
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.tables.table import Numbers
 
         total = Vectors.of(np.zeros(()))
@@ -213,7 +213,7 @@ class SecondRun:
 
     def _made(self, of_share: tuple[Doubled, Doubled], placed: Placed) -> Made:
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import part
+        from dalembert.arithmetic.doubled_operations import part
 
         masses, angles = of_share
         mass, depth, drill = part(masses, placed.place), Doubled(0.0), self.request.drill
@@ -224,8 +224,9 @@ class SecondRun:
     def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
         """Return the masses of a plane and their angles in degrees, (n,) each."""
         from cli.read.exact import writtens
-        from dalembert.arithmetic.doubled import PI, Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+        from dalembert.arithmetic.doubled import PI
+        from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.arithmetic.doubled_operations import doubled_array
 
         request = self.request
         if request.weights is not None:
@@ -235,7 +236,8 @@ class SecondRun:
             return goal.size * np.ones(1), goal[None].degrees
         places = request.exact_places()
         angles = doubled_array([place % 360 for place in places], (len(places),))
-        arms = Vectors.polar(Doubled(np.ones(len(places))), places, "deg", (len(places),))
+        around: Any = DoubledArray.of(angles)
+        arms: Any = phasor(np.ones(len(places)), around, "deg")
         masses = writtens(share.placed.masses)
         if request.stock is None:
             masses = share.placed.second_run(goal, arms, masses)
@@ -267,7 +269,7 @@ def _joined(numbers: Iterable[Doubled]) -> Doubled:
 
 def _one_after_another(vectors: Iterable[Vectors]) -> Vectors:
     """Vectors as one row."""
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
     return Vectors.joined([vector[None] for vector in vectors])
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from balancing.log_again import ExactPrior
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 
 def read_runout(path: str, runs: Runs) -> dict[str, complex]:
@@ -146,8 +146,9 @@ class Stored:
 
         from cli.read.exact import vectors
         from dalembert.arithmetic.doubled import PI, Doubled
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.arithmetic.doubled_functions import DOUBLED
-        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+        from dalembert.arithmetic.doubled_operations import doubled_array, part
 
         table, at = self.table, self._rows_of(rotor, channels, planes)
         alpha = vectors(self._exact_sizes("magnitude_per", runs), table.numbers["phase"])[at]
@@ -178,7 +179,7 @@ class Stored:
         for (s, p, q), (size, angle) in correlation.items():
             numbers = Numbers("", "deg", np.array([angle]), "angle")
             share[s, p, q] = vectors([Fraction(repr(size))], numbers)[0]
-            share[s, q, p] = share[s, p, q].conj
+            share[s, q, p] = share[s, p, q].conj()
         return alpha, share * part(sizes, (..., None)) * part(sizes, (..., None, slice(None))), sd
 
     def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Complex:
@@ -422,8 +423,8 @@ class Sisters:
         def exact() -> tuple[ExactPrior, Doubled]:
             from balancing.log_again import exact_pooled, exact_stored
             from dalembert.arithmetic.doubled import Doubled
+            from dalembert.arithmetic.doubled_arrays import Vectors
             from dalembert.arithmetic.doubled_functions import DOUBLED
-            from dalembert.arithmetic.doubled_vectors import Vectors
 
             known = [one.exact_coefficients(name, channels, planes, runs) for one, name in machines]
             alphas, covariances, _ = zip(*known, strict=True)

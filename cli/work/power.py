@@ -167,12 +167,12 @@ class WorkBalance:
     def second(self) -> list[tuple[LinkStates, Again]]:
         """The states of each group and what balances them in 32 digits, of the decimals of the table as they are written."""
         from cli.read.exact import plain
-        from dalembert.arithmetic.doubled_arrays import DoubledComplex
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         groups = []
         for (members, rows), (_, solved) in zip(self.places, self.groups, strict=True):
             states = self._link_states(self.states.exact, rows)
-            gravity: Any = DoubledComplex(plain(self.gravity.real), plain(self.gravity.imag))
+            gravity: Any = Vectors.of_parts(plain(self.gravity.real), plain(self.gravity.imag))
             states = replace(states, gravity=gravity)
             loads = (map(plain, of) for of in self.states.unit_loads(members, rows))
             unknowns = [UnitLoad(_vector(x, y), torque) for x, y, torque in loads]

@@ -32,12 +32,12 @@ def as_vectors(x: ArrayLike) -> NDArray[np.complex128]:
 
 
 def in_32_digits(x: ArrayLike) -> Any:
-    """Return the same numbers as a `DoubledArray`; complex ones as a `DoubledComplex`."""
-    from dalembert.arithmetic.doubled_arrays import DoubledArray, DoubledComplex
+    """Return the same numbers as a `DoubledArray`; complex ones as a `Vectors`."""
+    from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 
     if is_doubled(x):
         return x
-    return DoubledComplex.of(x) if np.iscomplexobj(x) else DoubledArray(x)
+    return Vectors.of(x) if np.iscomplexobj(x) else DoubledArray(x)
 
 
 def filled(shape: Shape, value: float, like: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from dalembert.units import UNITS, amplitude_kind, from_si, to_si
 if TYPE_CHECKING:
     from balancing.log_again import ExactFit, ExactPrior
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -211,14 +211,14 @@ class Group:
 
     def exact_of_amplitudes(self, i: int) -> Vectors:
         """Return the coefficients of a rotor without phase in 32 digits, (s, p)."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         readings, masses, _ = self.in_32_digits
         read = np.isfinite(self.readings[i]).astype(float)
 
         def mean(rows: list[int]) -> Vectors:
             counts: Real = read[rows].sum(axis=0)
-            means: Vectors = ((readings[i, rows] * read[rows]).total(0) / counts)[None]
+            means: Vectors = ((readings[i, rows] * read[rows]).sum(0) / counts)[None]
             return means
 
         first = mean([j for of in self.lines.rows for j in of if not self.masses[i, j].any()])
@@ -250,7 +250,7 @@ class Exact(NamedTuple):
 
     def in_planes(self, own: list[int], there: list[int], count: int) -> Exact:
         """Return the same with the masses of the planes `own` in the planes `there` of so many."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         masses, standing = (
             Vectors.of(np.zeros((*of.shape[:-1], count))) for of in (self.masses, self.standing)
