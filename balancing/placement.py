@@ -80,19 +80,20 @@ class Placement:
 
         By what the same shares in 32 digits differ, target and angles taken as exact. Weights from stock are as they are.
         """
-        from dalembert.angles import phasor
         from dalembert.arithmetic.doubled import Doubled
         from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_functions import DOUBLED
         from dalembert.arithmetic.doubled_operations import off
 
         if quantity not in ("masses", "total", "error"):
             raise ValueError(f"'{quantity}': expected masses, total or error")
         target, masses = Vectors.of(self.target), Doubled(self.masses)
-        arms: Any = phasor(np.ones(len(self.angles)), in_32_digits(self.angles), "rad")
+        sine, cosine = DOUBLED.sincos(Doubled(self.angles))
+        arms = Vectors(cosine, sine)
         exact = self.second_run(target, arms, masses)
         if quantity == "masses":
             return off(self.masses, exact)
-        total: Vectors = (arms * exact).sum()
+        total = (arms * exact).sum()
         return total.off(self.total) if quantity == "total" else (total - target).off(self.error)
 
     def second_run(self, target: Vectors, arms: Vectors, masses: Doubled) -> Doubled:

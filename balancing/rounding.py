@@ -6,16 +6,16 @@ and those of the minimax problem, are in `balancing.optimality`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import roundings
+from balancing.dependence import damped, roundings
 from balancing.influence import influence_coefficients
-from balancing.second_run import damped, smallest_squares
+from balancing.second_run import smallest_squares
 from dalembert.arithmetic.doubled import Doubled, doubled
-from dalembert.arithmetic.doubled_arrays import Vectors
+from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_operations import part
 
@@ -83,12 +83,14 @@ class Problem(NamedTuple):
 
 def least_squares_again(problem: Problem, ridge: float | Doubled) -> Vectors:
     """Return the corrections of a least-squares problem without limits in 32 digits."""
-    a, b = problem.influence, problem.initial
+    a: Any = problem.influence
+    b, ridge = problem.initial, doubled(ridge)
     if problem.weights is not None:
         of_rows = DOUBLED.sqrt(Doubled(np.asarray(problem.weights, dtype=float)))
         a, b = a * part(of_rows, (..., None)), b * of_rows
-    if doubled(ridge).high:
-        a = damped(ridge, a)
+    if ridge.high:
+        of_columns: Any = DoubledArray.of(ridge)
+        a = damped(a, of_columns)
         lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
         b = Vectors.joined(
             [b + Vectors.of(np.zeros((*lead, 1))), Vectors.of(np.zeros((*lead, a.shape[-1])))], axis=-1

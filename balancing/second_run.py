@@ -7,12 +7,12 @@ A x + b = r with Σ|r|² least, by Gram and Schmidt's orthogonalisation in its m
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import damping_norms, threshold
+from balancing.dependence import threshold
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_arrays import Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
@@ -138,15 +138,6 @@ def _orthogonal(a: Vectors) -> tuple[list[Vectors], list[list[Vectors]]]:
     return columns, upper
 
 
-def damped(ridge: float | Doubled, a: Vectors) -> Vectors:
-    """Return A (..., m, n) with the rows λ‖A_k‖ of a ridge below it."""
-    norms, n = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
-    given = norms.high > 0
-    norms = Doubled(np.where(given, norms.high, damping_norms(a.value)), np.where(given, norms.low, 0.0))
-    below = part(norms * ridge, (..., None)) * np.eye(n)
-    return Vectors.joined([a, Vectors(below, below * 0.0)], axis=-2)
-
-
 def pseudo_inverse(a: Vectors) -> Vectors:
     """Return A⁺ (..., n, m) of A (..., m, n); its rank is that of the floats nearest to it.
 
@@ -196,9 +187,19 @@ def _independent(a: NDArray[np.complex128], rank: int) -> list[int]:
     return sorted(numbers)
 
 
-def chosen(where: NDArray[np.bool_], a: Doubled, otherwise: float | Real = 0.0) -> Doubled:
-    """Return a, and plain numbers elsewhere."""
-    return Doubled(np.where(where, a.high, otherwise), np.where(where, a.low, 0.0))
+def root_of(covariance: Vectors) -> Vectors:
+    """Return Cholesky's root (..., p, p) of covariances, which may be singular."""
+    root = Vectors.of(np.zeros(covariance.shape))
+    for j in range(covariance.shape[-1]):
+        for i in range(j, covariance.shape[-1]):
+            rest: Any = covariance[..., i, j] - (root[..., i, :j] * root[..., j, :j].conj()).sum()
+            if i == j:
+                # what is left in the rounding of 32 digits is nothing
+                some = rest.x.high > 1e-28 * covariance[..., j, j].x.high
+                size = np.sqrt(np.where(some, rest.real, 1.0))
+                rest = rest.real
+            root[..., i, j] = rest / size * some.astype(float)
+    return root
 
 
 def product(a: Vectors, b: Vectors) -> Vectors:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from balancing import pooled_prior, stored_prior
+from balancing import Prior, pooled_prior, stored_prior
 from cli.read.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
 from cli.read.runs.vectors import Alpha, alpha_of
 from dalembert.angles import phasor
@@ -20,7 +20,6 @@ from dalembert.units import UNITS, from_si
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from balancing.log_again import ExactPrior
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_arrays import Vectors
 
@@ -420,21 +419,19 @@ class Sisters:
             scatter = (float(np.sqrt((weight * np.square(sds)).sum() / weight.sum())), freedom)
         between = float(prior.scatter)
 
-        def exact() -> tuple[ExactPrior, Doubled]:
-            from balancing.log_again import exact_pooled, exact_stored
+        def exact() -> tuple[Prior, Any]:
             from dalembert.arithmetic.doubled import Doubled
-            from dalembert.arithmetic.doubled_arrays import Vectors
-            from dalembert.arithmetic.doubled_functions import DOUBLED
+            from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 
             known = [one.exact_coefficients(name, channels, planes, runs) for one, name in machines]
             alphas, covariances, _ = zip(*known, strict=True)
-            alpha, covariance = (Vectors.joined([of[None] for of in part]) for part in (alphas, covariances))
+            exactly: Any = [Vectors.joined([of[None] for of in part]) for part in (alphas, covariances)]
             square = sum(
                 (sd * sd * w for (_, _, sd), w in zip(known, weight.tolist(), strict=True)), Doubled(0.0)
             )
-            reading = DOUBLED.sqrt(square / (float(weight.sum()) or 1.0))
+            reading = np.sqrt(DoubledArray.of(square / (float(weight.sum()) or 1.0)))
             if len(known) > 1:
-                return exact_pooled(alpha, covariance), reading
-            return exact_stored(alpha[0], covariance[0]), reading
+                return pooled_prior(*exactly), reading
+            return stored_prior(*(of[0] for of in exactly)), reading
 
         return Before(prior, len(each), between if between == between else None, scatter, exact)

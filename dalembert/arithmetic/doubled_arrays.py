@@ -7,7 +7,6 @@ run.
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -19,10 +18,12 @@ from dalembert.angles import degrees
 from dalembert.arithmetic.doubled import PI, Doubled
 from dalembert.arithmetic.doubled_functions import DOUBLED, constant
 from dalembert.arithmetic.doubled_operations import (
+    COMPLEX,
     FUNCTIONS,
     LAYOUT,
     OWN,
     PLACES,
+    PRODUCTS,
     UFUNCS,
     joined,
     off,
@@ -132,7 +133,7 @@ class DoubledArray(NDArrayOperatorsMixin):
         """These numbers in another shape."""
         return DoubledArray(self.high.reshape(*shape), self.low.reshape(*shape))
 
-    def sum(self, axis: int = -1, keepdims: bool = False) -> DoubledArray:
+    def sum(self, axis: Any = -1, keepdims: bool = False) -> DoubledArray:
         """The sum along an axis, in pairs."""
         summed = DoubledArray.of(total(Doubled(self.high, self.low), axis))
         return _each(np.expand_dims, summed, axis) if keepdims else summed
@@ -163,8 +164,7 @@ class DoubledArray(NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **_: Any) -> Any:
         if any(map(_is_complex, inputs)):
-            work = _COMPLEX.get(ufunc)
-            return NotImplemented if work is None else work(*map(_vectors, inputs))
+            return _of_complex(ufunc, method, inputs)
         work = UFUNCS.get(ufunc)
         if work is None or method != "__call__":
             return NotImplemented
@@ -323,6 +323,14 @@ class Vectors(NDArrayOperatorsMixin):
         """The sum along an axis, in pairs."""
         return Vectors(total(self.x, axis), total(self.y, axis))
 
+    def reshape(self, *shape: Any) -> Vectors:
+        """These numbers in another shape."""
+        return Vectors.of_parts(self.real.reshape(*shape), self.imag.reshape(*shape))
+
+    def copy(self) -> Vectors:
+        """These numbers again, to be changed."""
+        return Vectors.of_parts(*(DoubledArray(x.high.copy(), x.low.copy()) for x in (self.real, self.imag)))
+
     def swapped(self) -> Vectors:
         """The vectors with their last two axes exchanged."""
         parts = ((x.high, x.low + 0.0 * x.high) for x in (self.x, self.y))
@@ -350,18 +358,23 @@ class Vectors(NDArrayOperatorsMixin):
         return cls(*(joined([getattr(z, name) for z in each], axis) for name in ("x", "y")))
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **_: Any) -> Any:
-        work = _COMPLEX.get(ufunc)
-        return NotImplemented if work is None or method != "__call__" else work(*map(_vectors, inputs))
+        return _of_complex(ufunc, method, inputs)
 
     def __array_function__(self, function: Any, _: Any, args: Any, kwargs: Any) -> Any:
-        if function is np.sum:
-            return args[0].sum(**kwargs)
-        if function is np.shape:
-            return args[0].shape
+        if function in FUNCTIONS:
+            return FUNCTIONS[function](*args, **kwargs)
+        if function is np.zeros_like:
+            return Vectors.of(np.zeros(args[0].shape))
         if function not in LAYOUT:
             return NotImplemented
+        places = PLACES.get(function, (0,))
         return Vectors.of_parts(
-            *(_each(function, *_parts(args, name), **kwargs) for name in ("real", "imag"))
+            *(
+                _each(
+                    function, *(_parts(x, name) if i in places else x for i, x in enumerate(args)), **kwargs
+                )
+                for name in ("real", "imag")
+            )
         )
 
 
@@ -378,6 +391,15 @@ def _vectors(x: Any) -> Vectors:
     return Vectors(real.doubled, Doubled(np.zeros(np.shape(real.high))))
 
 
+def _of_complex(ufunc: Any, method: str, inputs: tuple[Any, ...]) -> Any:
+    if ufunc not in COMPLEX or method != "__call__":
+        return NotImplemented
+    # a real factor stays real
+    inputs = tuple(x if ufunc in PRODUCTS and not _is_complex(x) else _vectors(x) for x in inputs)
+    with np.errstate(all="ignore"):
+        return COMPLEX[ufunc](*inputs)
+
+
 def _plain(x: Any) -> Any:
     return x.doubled if isinstance(x, DoubledArray) else constant(x) if type(x) is float else x
 
@@ -386,28 +408,7 @@ def _parts(x: Any, name: str) -> Any:
     """The real or the imaginary parts of what a function of arrays is called with."""
     if isinstance(x, (list, tuple)):
         return [_parts(each, name) for each in x]
-    return getattr(x, name) if isinstance(x, Vectors) else x
-
-
-def _of_vectors(function: Callable[..., Vectors]) -> Callable[..., Vectors]:
-    """An operation of vectors without warnings of floats."""
-
-    def work(*z: Vectors) -> Vectors:
-        with np.errstate(all="ignore"):
-            return function(*z)
-
-    return work
-
-
-_COMPLEX: dict[Any, Callable[..., Any]] = {
-    np.add: _of_vectors(operator.add),
-    np.subtract: _of_vectors(operator.sub),
-    np.multiply: _of_vectors(operator.mul),
-    np.true_divide: _of_vectors(operator.truediv),
-    np.negative: _of_vectors(operator.neg),
-    np.conjugate: lambda z: z.conj(),
-    np.absolute: lambda z: np.hypot(z.real, z.imag),
-}
+    return getattr(_vectors(x), name)
 
 
 def _entering(x: Any) -> Any:

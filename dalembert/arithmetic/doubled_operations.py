@@ -6,8 +6,10 @@ Of `Doubled` numbers with arrays as their parts; from `compared` on they ask onl
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterable
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -44,18 +46,22 @@ def part(x: Doubled, index: Any) -> Doubled:
     return Doubled(x.high[index], x.low[index] if np.ndim(x.low) else x.low)
 
 
-def total(x: Doubled, axis: int = -1) -> Doubled:
-    """The sum of a doubled array along an axis, in pairs."""
-    rest = np.broadcast_to(x.low, np.shape(x.high))
-    x = Doubled(np.moveaxis(x.high, axis, 0), np.moveaxis(rest, axis, 0))
-    if not len(x.high):
-        nothing = np.zeros(x.high.shape[1:])
+def total(x: Doubled, axis: int | tuple[int, ...] = -1) -> Doubled:
+    """The sum of a doubled array along an axis, or axes counted from the last one, in pairs."""
+    if isinstance(axis, tuple):
+        return reduce(total, sorted(axis), x)
+    shape = x.high.shape
+    before: tuple[Any, ...] = (slice(None),) * (axis % len(shape))
+    if not (many := shape[axis]):
+        nothing = np.zeros(np.delete(shape, axis))
         return Doubled(nothing, nothing)
-    while (many := len(x.high)) > 1:
+    while many > 1:
         half = many // 2
-        pairs = part(x, slice(half)) + part(x, slice(half, 2 * half))
-        x = joined([pairs, part(x, slice(2 * half, many))], 0) if many % 2 else pairs
-    return settled(x.high[0], x.low[0])
+        pairs = part(x, (*before, slice(half))) + part(x, (*before, slice(half, 2 * half)))
+        x = joined([pairs, part(x, (*before, slice(2 * half, many)))], axis) if many % 2 else pairs
+        many -= half
+    x = part(x, (*before, 0))
+    return settled(x.high, x.low)
 
 
 def doubled_array(exact: Iterable[Fraction], shape: tuple[int, ...]) -> Doubled:
@@ -201,6 +207,43 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.diff: lambda x: x[1:] - x[:-1],
     np.cumsum: lambda x: running(lambda a, b: a + b, x),
     np.cumprod: lambda x: running(lambda a, b: a * b, x),
+    np.linalg.norm: lambda x, axis: np.sqrt((x.real * x.real + x.imag * x.imag).sum(axis)),
     np.shape: lambda x: x.shape,
     np.ndim: lambda x: x.ndim,
 }
+
+
+def contracted(subscripts: str, a: Any, b: Any) -> Any:
+    """The sum of products of the entries of two arrays as `np.einsum` writes it, their first axes being alike: "...ij,...jk->...k"."""
+    names, result = subscripts.replace("...", "").split("->")
+    each = names.split(",")
+    order = result + "".join(sorted({*names} - {*result, ","}))
+    parts = []
+    for x, own in zip((a, b), each, strict=True):
+        here = [name for name in order if name in own]
+        x = np.moveaxis(x, [own.index(name) - len(own) for name in here], range(-len(here), 0))
+        parts.append(x[(..., *(slice(None) if name in own else None for name in order))])
+    summed = parts[0] * parts[1]
+    for _ in order[len(result) :]:
+        summed = summed.sum(axis=-1)
+    return summed
+
+
+FUNCTIONS[np.einsum] = contracted
+
+COMPLEX: dict[Any, Callable[..., Any]] = {
+    np.add: operator.add,
+    np.subtract: operator.sub,
+    np.multiply: lambda a, b: a * b if hasattr(a, "x") else b * a,
+    np.true_divide: operator.truediv,
+    np.negative: operator.neg,
+    np.conjugate: lambda z: z.conj(),
+    np.absolute: lambda z: np.hypot(z.real, z.imag),
+    np.isfinite: lambda z: np.isfinite(z.value),
+    np.isinf: lambda z: np.isinf(z.value),
+    np.matmul: product,
+    np.matvec: lambda a, x: (a * x[..., None, :]).sum(),
+}
+"""The operations of `Vectors`."""
+
+PRODUCTS = {np.multiply, np.matmul}

@@ -23,7 +23,7 @@ def as_array(x: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(x, dtype=float)
 
 
-def as_vectors(x: ArrayLike) -> NDArray[np.complex128]:
+def as_vectors(x: Any) -> NDArray[np.complex128]:
     """Return an array of complex numbers x + iy; one of 32 digits stays as it is."""
     if is_doubled(x):
         doubled: NDArray[np.complex128] = x
@@ -38,6 +38,11 @@ def in_32_digits(x: ArrayLike) -> Any:
     if is_doubled(x):
         return x
     return Vectors.of(x) if np.iscomplexobj(x) else DoubledArray(x)
+
+
+def floats(x: Any) -> Any:
+    """Return the floats nearest to numbers: what decides is taken from them in the second run too."""
+    return x.value if is_doubled(x) else x
 
 
 def filled(shape: Shape, value: float, like: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,6 @@ from dalembert.tables.table import Table, numbered
 from dalembert.units import UNITS, amplitude_kind, from_si, to_si
 
 if TYPE_CHECKING:
-    from balancing.log_again import ExactFit, ExactPrior
-    from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
@@ -93,7 +91,7 @@ class Before:
     """Between machines, as a share of the coefficients; None of one machine."""
     reading: tuple[float, float] | None
     """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
-    exact: Callable[[], tuple[ExactPrior, Doubled]]
+    exact: Callable[[], tuple[balancing.Prior, Any]]
     """The coefficients and that deviation in 32 digits, as the files have them; computed on request."""
 
 
@@ -195,19 +193,13 @@ class Group:
         """Readings, masses and standing, once the fit has shown the sense of the phases."""
         return self.exact()
 
-    def exact_scatter(self, fit: ExactFit) -> Doubled:
+    def exact_scatter(self, fit: balancing.JointFit) -> Any:
         """Return the deviation of the readings in 32 digits, (g,): as residuals scatter, or as those of sisters did, or none."""
-        from balancing.second_run import chosen
-        from dalembert.arithmetic.doubled import Doubled
-
         sd, estimated = self.fit.residual_sd, np.asarray(self.fit.degrees_of_freedom > 0)
-        scatter = chosen(estimated & (sd > 0), fit.residual_sd)
+        scatter = np.where(estimated & (sd > 0), fit.residual_sd, 0.0)
         if self.before is None or self.before.reading is None:
             return scatter
-        before = self.before.exact()[1]
-        return Doubled(
-            *(np.where(estimated, *both) for both in ((scatter.high, before.high), (scatter.low, before.low)))
-        )
+        return np.where(estimated, scatter, self.before.exact()[1])
 
     def exact_of_amplitudes(self, i: int) -> Vectors:
         """Return the coefficients of a rotor without phase in 32 digits, (s, p)."""
