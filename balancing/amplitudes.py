@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -76,13 +76,14 @@ class AmplitudeFit:
         trials on a line through them.
         """
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors, off
+        from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_operations import off
 
         if quantity not in ("influence", "misfit"):
             raise ValueError(f"'{quantity}': expected influence or misfit")
         data = Doubled(self.initial), Doubled(self.trials), Vectors.of(self.trial_masses)
         influence, misfit = self.second_run(*data)
-        error = influence.apart(self.influence) if quantity == "influence" else off(self.misfit, misfit)
+        error = influence.off(self.influence) if quantity == "influence" else off(self.misfit, misfit)
         return np.where(np.isfinite(influence.x.high), error, np.inf)
 
     def second_run(self, initial: Doubled, trials: Doubled, trial_masses: Vectors) -> tuple[Vectors, Doubled]:
@@ -92,8 +93,9 @@ class AmplitudeFit:
         coefficients with these values in 32 digits and the inverse of the second derivatives in 16.
         """
         from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.arithmetic.doubled_functions import DOUBLED
-        from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+        from dalembert.arithmetic.doubled_operations import part, total
 
         unit, inverse = float(np.abs(self.trial_masses).max()), self._at.inverse
         sure = np.asarray(np.isfinite(inverse).all(axis=(-2, -1)))
@@ -107,7 +109,7 @@ class AmplitudeFit:
             y = z[:, None] * t + Vectors.of(np.ones((1, 1)))
             length = y.size
             f = length - read
-            pull = (y * t.conj * (f / length)).total().value
+            pull = (y * t.conj() * (f / length)).sum().value
             step = (inverse @ np.stack([pull.real, pull.imag], axis=-1)[..., None])[..., 0]
             reach = np.hypot(step[:, 0], step[:, 1])
             size = np.abs(z.value)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from balancing.rounding import Problem
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
     from dalembert.page import Page
 
 Real = NDArray[np.float64]
@@ -183,12 +183,12 @@ class Balance:
         problem = self._problem(exact)
         true = (self._again if exact is None else self._found(problem))[0]
         if quantity == "corrections":
-            return np.full(self.corrections.shape, np.inf) if true is None else true.apart(self.corrections)
+            return np.full(self.corrections.shape, np.inf) if true is None else true.off(self.corrections)
         if quantity not in ("residual", "residual_max", "residual_rms"):
             raise ValueError(f"'{quantity}': expected corrections, residual, residual_max or residual_rms")
         residual = self.residual
         nothing = np.full(residual.shape, np.inf)
-        off = nothing if true is None else problem.residual(true).apart(residual)
+        off = nothing if true is None else problem.residual(true).off(residual)
         if quantity == "residual":
             return off
         if quantity == "residual_rms":
@@ -217,7 +217,7 @@ class Balance:
 
     def _problem(self, exact: tuple[Vectors, Vectors] | None) -> Problem:
         from balancing.rounding import Problem
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         floats = self.influence, self.initial
         data = exact or (Vectors.of(self.influence), Vectors.of(self.initial))

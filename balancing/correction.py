@@ -240,28 +240,27 @@ class Correction:
         """
         from balancing.second_run import HIDDEN
         from dalembert.arithmetic.doubled import PI, Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors, off
+        from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_operations import off
 
         second = self.exact if exact is None else exact
         if quantity in ("static", "couple"):
             if quantity == "static":
-                return np.asarray(second.static.apart(self.static) + self._hidden(np.ones(self.z.shape)))
+                return np.asarray(second.static.off(self.static) + self._hidden(np.ones(self.z.shape)))
             about = np.broadcast_to(self.planes[..., 0] if at is None else at, self.static.shape)
             true = second.about(Doubled(about[..., None]))[..., 0]
-            return np.asarray(
-                true.apart(self.couple(about)) + self._hidden(np.abs(self.z - about[..., None]))
-            )
+            return np.asarray(true.off(self.couple(about)) + self._hidden(np.abs(self.z - about[..., None])))
         if quantity in ("residual_static", "residual_couple"):
             about = self.planes[..., 0]
             static, couple = second.residual(Vectors.of(self.unbalance), Doubled(about))
             left = HIDDEN * self.amplification * np.abs(self.moment).sum(axis=-1)
             if quantity == "residual_static":
-                return np.asarray(static.apart(self.residual.static) + left)
+                return np.asarray(static.off(self.residual.static) + left)
             lever = np.abs(self.planes - about[..., None]).max(axis=-1, initial=0.0)
             lever = np.maximum(lever, np.abs(self.z - about[..., None]).max(axis=-1, initial=0.0))
-            return np.asarray(couple.apart(self.residual.couple) + left * lever)
+            return np.asarray(couple.off(self.residual.couple) + left * lever)
         true = second.corrections
-        bound = true.apart(self.unbalance) + HIDDEN * self._terms
+        bound = true.off(self.unbalance) + HIDDEN * self._terms
         if quantity == "unbalance":
             return bound
         if quantity == "mass":
@@ -281,7 +280,7 @@ class Correction:
         """The floats as the second run takes them."""
         from balancing.second_run import ExactMasses
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         return ExactMasses(Vectors.of(self.moment), Doubled(self.z), Doubled(self.planes))
 

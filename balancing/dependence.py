@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
-from dalembert.arithmetic.shapes import as_numbers, common_shape
+from dalembert.arithmetic.shapes import as_numbers, common_shape, floats
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -152,7 +152,8 @@ def _normed(direction: Complex) -> Complex:
 
 def columns_scaled(a: Complex) -> tuple[Complex, Real]:
     """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
-    size = np.abs(a)
+    values = floats(a)
+    size = np.abs(values)
     square = np.einsum("...sp,...sp->...p", size, size)
     low, high = square.min(initial=1e200), square.max(initial=1e-200)
     if low > 1e-280 and high < 1e280:
@@ -163,7 +164,7 @@ def columns_scaled(a: Complex) -> tuple[Complex, Real]:
         exponent = (np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1) >> 1
     else:
         # the squares leave the range of numbers, or a column is zero
-        peak = np.maximum(np.abs(a.real), np.abs(a.imag)).max(axis=-2)
+        peak = np.maximum(np.abs(values.real), np.abs(values.imag)).max(axis=-2)
         highest = peak.max(axis=-1, keepdims=True)
         exponent = np.where(peak > 0, np.frexp(highest)[1] - np.frexp(peak)[1], 0)
     if not exponent.any():
@@ -172,11 +173,12 @@ def columns_scaled(a: Complex) -> tuple[Complex, Real]:
     return a * scale[..., None, :], scale
 
 
-def damping_norms(a: Complex) -> Real:
-    """Return ‖a_p‖ of each column, (..., p): what a ridge damps it by; of one of zeros the largest, or 1."""
+def damped(a: Complex, ridge: float) -> Complex:
+    """Return A (..., m, n) with the rows λ‖A_k‖ of a ridge below it; the norm of a column of zeros is the largest, or 1."""
     norms = np.linalg.norm(a, axis=-2)
     largest = norms.max(axis=-1, keepdims=True)
-    return np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
+    norms = ridge * np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
+    return np.concatenate([a, norms[..., None] * np.eye(norms.shape[-1])], axis=-2)
 
 
 def threshold(rows: int, columns: int) -> float:

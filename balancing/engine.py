@@ -277,7 +277,6 @@ def opposite(moment: Any, z: Any, planes: Any) -> Any:
     if not is_doubled(moment):
         return correct(moment, z, planes).unbalance
     from balancing.second_run import ExactMasses
-    from dalembert.arithmetic.doubled_arrays import DoubledComplex
 
     places = (in_32_digits(np.atleast_1d(x)).doubled for x in (z, planes))
-    return DoubledComplex.of(ExactMasses(moment.vectors, *places).corrections)
+    return ExactMasses(moment, *places).corrections

@@ -188,9 +188,9 @@ def _in_floats(a: Complex, b: Complex, w: Complex) -> Complex:
 
 def _in_32_digits(a: Complex, b: Complex, w: Complex) -> Complex:
     """Return b + a w, rounded once: of large masses that leave little it has all its digits."""
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
-    return (Vectors.of(b) + (Vectors.of(a) * Vectors.of(w)[None]).total()).value
+    return (Vectors.of(b) + (Vectors.of(a) * Vectors.of(w)[None]).sum()).value
 
 
 class _Limited:

@@ -15,6 +15,7 @@ from balancing.dependence import design, directions
 from balancing.reading_errors import Errors, components, response, wider_draws
 from balancing.run_log import JointFit
 from dalembert.arithmetic.records import numbers, record
+from dalembert.arithmetic.shapes import filled, floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
@@ -220,7 +221,7 @@ class LogBalance:
         if before is None or self.fit.foreknown is None:
             return Spread(own, np.broadcast_to(nu, own.shape[:-2]))
         # Welch and Satterthwaite
-        a, b = (np.trace(part, axis1=-2, axis2=-1) for part in (own, before))
+        a, b = (np.trace(floats(part), axis1=-2, axis2=-1) for part in (own, before))
         whole = np.square(a) / nu + np.square(b) / self.fit.foreknown.degrees_of_freedom[..., None]
         both = np.square(a + b)
         freedom = np.where(
@@ -387,7 +388,8 @@ class LogBalance:
 def _unit_errors(sources: Complex) -> tuple[Complex, Real, Real]:
     """Direction and deviations of circular errors z, E|z|² = 1, one for each column of (..., q)."""
     ones = np.ones(sources.shape[-1])
-    return ones.astype(complex), ones / np.sqrt(2), ones / np.sqrt(2)
+    half = ones / np.sqrt(filled((), 2.0, sources.real))
+    return ones.astype(complex), half, half
 
 
 def spread(samples: Complex, about: Complex) -> Real:

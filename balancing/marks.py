@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dalembert.arithmetic.shapes import as_array, is_doubled
+from dalembert.arithmetic.shapes import as_array, floats
 
 FEWEST, MOST = 7, 255
 """Marks in a row that one cubic is fitted to."""
@@ -85,11 +85,6 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
     bend = np.maximum(abs(rise - level[rises] + before), abs(after - level[rises + 1] - rise))
     at, off = time[rises] + (half - level[rises]) / rise * long, np.minimum(bend / rise / 8, 0.5) * long
     return Marks(at, at - off, at + off)
-
-
-def floats(x: Any) -> Any:
-    """The floats nearest to numbers: what decides is taken from them in the second run too."""
-    return x.value if is_doubled(x) else x
 
 
 def _even(low: Any, high: Any) -> Marks:

@@ -21,8 +21,9 @@ from balancing.cone_problem import real_rows
 from balancing.dependence import adjoint, columns_scaled
 from balancing.rounding import Problem
 from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled_arrays import Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+from dalembert.arithmetic.doubled_operations import part, total
 from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
@@ -111,7 +112,7 @@ class _Optimum:
         planes = len(w)
         rows_e, rows_square = exact.e.value, exact.square.value
         start = Vectors.of(w)
-        value = (exact.offset + (exact.e * start[None]).total()).value
+        value = (exact.offset + (exact.e * start[None]).sum()).value
         size = np.abs(value)
         # the unit is chosen so that t = 1
         radius = exact.h + exact.f
@@ -144,7 +145,7 @@ class _Optimum:
             self.gradient[:, -1] = -f
         self.across = np.zeros((m, n))
         self.across[:, : 2 * planes] = im
-        left = (exact.at + (exact.square * start[None]).total()).value
+        left = (exact.at + (exact.square * start[None]).sum()).value
         slope = np.zeros(n)
         pull = adjoint(undo) @ (adjoint(rows_square) @ left)
         slope[:planes], slope[planes : 2 * planes] = pull.real, pull.imag
@@ -186,12 +187,12 @@ class _Optimum:
         mu, t = Doubled(self.mu), Doubled(np.ones(1))
         last = np.inf
         for _ in range(40):
-            value = offset + (e * w[None]).total()
+            value = offset + (e * w[None]).sum()
             size = value.size
-            pull = (e.conj * (value * (mu / size))[:, None]).total(0)
+            pull = (e.conj() * (value * (mu / size))[:, None]).sum(0)
             if len(rows.at.x.high):
-                left = rows.at + (rows.square * w[None]).total()
-                pull = pull + (rows.square.conj * left[:, None]).total(0)
+                left = rows.at + (rows.square * w[None]).sum()
+                pull = pull + (rows.square.conj() * left[:, None]).sum(0)
             slope = adjoint(self.undo) @ pull.value
             conditions = [slope.real, slope.imag, (size - (t * f + h)).value]
             if with_t:
@@ -212,7 +213,7 @@ class _Optimum:
 
     def _check(self, size: Real, radius: Real, held: NDArray[np.bool_]) -> None:
         """See to it that what is inactive stays so, and that the values hardly turn: else first order is not enough."""
-        value = (self.rows.offset + (self.rows.e * self.true[None]).total()).value
+        value = (self.rows.offset + (self.rows.e * self.true[None]).sum()).value
         moved = np.abs(np.abs(value) - size)
         turned = moved[self.active] / self.size
         if turned.max(initial=0.0) > 1e-3 or (size + moved >= radius)[~held].any():

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -80,21 +80,21 @@ class Placement:
 
         By what the same shares in 32 digits differ, target and angles taken as exact. Weights from stock are as they are.
         """
-        from fractions import Fraction
-
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors, off
+        from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_functions import DOUBLED
+        from dalembert.arithmetic.doubled_operations import off
 
         if quantity not in ("masses", "total", "error"):
             raise ValueError(f"'{quantity}': expected masses, total or error")
-        n, target, masses = len(self.angles), Vectors.of(self.target), Doubled(self.masses)
-        angles = [Fraction(angle) for angle in self.angles.tolist()]
-        arms = Vectors.polar(Doubled(np.ones(n)), angles, "rad", (n,))
+        target, masses = Vectors.of(self.target), Doubled(self.masses)
+        sine, cosine = DOUBLED.sincos(Doubled(self.angles))
+        arms = Vectors(cosine, sine)
         exact = self.second_run(target, arms, masses)
         if quantity == "masses":
             return off(self.masses, exact)
-        total = (arms * exact).total()
-        return total.apart(self.total) if quantity == "total" else (total - target).apart(self.error)
+        total = (arms * exact).sum()
+        return total.off(self.total) if quantity == "total" else (total - target).off(self.error)
 
     def second_run(self, target: Vectors, arms: Vectors, masses: Doubled) -> Doubled:
         """Return the masses (n,) in 32 digits: the free ones share what the others, as given, leave of the target."""
@@ -105,13 +105,13 @@ class Placement:
             return masses
         others = np.ones(len(self.masses))
         others[free] = 0.0
-        rest = target - (arms * (masses * others)).total()
+        rest = target - (arms * (masses * others)).sum()
         one, other = arms[free[0]], arms[free[-1]]
         if len(free) == 2:
-            across = (one.conj * other).y
-            shares = [(rest.conj * other).y / across, (one.conj * rest).y / across]
+            across = (one.conj() * other).y
+            shares = [(rest.conj() * other).y / across, (one.conj() * rest).y / across]
         else:
-            shares = [(rest * one.conj).x]
+            shares = [(rest * one.conj()).x]
         high, low = masses.high.copy(), np.broadcast_to(masses.low, masses.high.shape).copy()
         for k, share in zip(free, shares, strict=True):
             # one that its limit holds stays there

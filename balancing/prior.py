@@ -12,19 +12,21 @@ so that informative runs count more.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import adjoint, columns_scaled, design, threshold
+from balancing.qr import pseudo_inverse
 from balancing.run_log import Foreknown, JointFit
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_array, as_vectors, filled, floats, in_32_digits, is_doubled
 
 if TYPE_CHECKING:
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -72,21 +74,31 @@ def stored_prior(mean: ArrayLike, covariance: ArrayLike, degrees_of_freedom: Arr
     >>> stored_prior([[2.0]], [[[0.04]]]).factor
     array([[[0.2+0.j]]])
     """
-    alpha, c = np.asarray(mean, dtype=complex), np.asarray(covariance, dtype=complex)
+    alpha, c = as_vectors(mean), as_vectors(covariance)
     channels, planes = alpha.shape[-2:]
     if c.shape != (*alpha.shape, planes):
         raise ValueError(f"shapes do not fit: mean {alpha.shape}, covariance {c.shape}")
-    size, axes = np.linalg.eigh(c)
-    if not (size > -1e-9 * np.abs(size).max(axis=-1, keepdims=True, initial=1e-300)).all():
-        raise ValueError("a covariance must not be negative")
-    root = axes * np.sqrt(np.maximum(size, 0.0))[..., None, :]
+    root = _root(c)
     # the channels' errors are independent of one another
-    factor = np.zeros((*alpha.shape, channels, planes), dtype=complex)
+    factor = np.zeros_like(root.real, dtype=complex, shape=(*alpha.shape, channels, planes))
     for s in range(channels):
         factor[..., s, :, s, :] = root[..., s, :, :]
     lead = alpha.shape[:-2]
     nu = np.broadcast_to(np.asarray(degrees_of_freedom, dtype=float), lead)
     return Prior(alpha, factor.reshape(*alpha.shape, channels * planes), nu, root, np.full(lead, np.nan))
+
+
+def _root(covariance: Complex) -> Complex:
+    """A root (..., p, p) of covariances."""
+    if is_doubled(covariance):
+        from balancing.second_run import root_of
+
+        doubled: Any = covariance
+        return as_vectors(root_of(doubled))
+    size, axes = np.linalg.eigh(covariance)
+    if not (size > -1e-9 * np.abs(size).max(axis=-1, keepdims=True, initial=1e-300)).all():
+        raise ValueError("a covariance must not be negative")
+    return np.asarray(axes * np.sqrt(np.maximum(size, 0.0))[..., None, :])
 
 
 def pooled_prior(coefficients: ArrayLike, covariances: ArrayLike | None = None) -> Prior:
@@ -123,29 +135,29 @@ def pooled_prior(coefficients: ArrayLike, covariances: ArrayLike | None = None) 
     >>> found.mean, found.scatter.round(3), found.degrees_of_freedom
     (array([[2.+0.j]]), np.float64(0.2), array(2.))
     """
-    each = np.asarray(coefficients, dtype=complex)
+    each = as_vectors(coefficients)
     if each.ndim != 3 or len(each) < 2:
         raise ValueError(f"expected coefficients (m, s, p) of two machines or more, found shape {each.shape}")
-    machines = len(each)
-    mean = each.mean(axis=0)
+    machines = filled((), float(len(each)), each.real)
+    mean = each.sum(axis=0) / machines
     d = np.moveaxis(each - mean, 0, -1) / np.sqrt(machines - 1)
     square = np.square(np.abs(mean))
-    scale = np.where(square > 0, square, square.max() or 1.0)
-    whole = float((np.square(np.abs(d)).sum(axis=-1) / scale).mean())
-    of_readings = 0.0
-    if covariances is not None:
-        c = np.asarray(covariances, dtype=complex)
-        of_readings = float((np.diagonal(c, axis1=-2, axis2=-1).real.mean(axis=0) / scale).mean())
-    taken = min(of_readings / whole, 1.0) if whole else 0.0
+    scale = np.where(square > 0, square, floats(square).max() or 1.0)
+
+    def share(sizes: Real) -> Real:
+        """The mean of sizes (s, p), each as a share of the coefficient's own."""
+        shares = (sizes / scale).reshape(-1)
+        return as_array(shares.sum(axis=-1) / len(shares))
+
+    whole = share(np.square(np.abs(d)).sum(axis=-1))
+    taken = filled((), 0.0, whole)
+    if covariances is not None and whole != 0:
+        own = np.diagonal(as_vectors(covariances), axis1=-2, axis2=-1).real
+        taken = np.minimum(share(own.sum(axis=0) / machines) / whole, 1.0)
     left = 1 + 1 / machines - taken
     root = np.sqrt(whole * left * scale)[..., None] * np.eye(mean.shape[-1], dtype=complex)
-    return Prior(
-        mean,
-        d * np.sqrt(left),
-        np.asarray(float(machines - 1)),
-        root,
-        np.asarray(np.sqrt(whole * (1 - taken))),
-    )
+    scatter = as_array(np.sqrt(whole * (1 - taken)))
+    return Prior(mean, d * np.sqrt(left), np.asarray(float(len(each) - 1)), root, scatter)
 
 
 def fit_with_prior(
@@ -189,7 +201,7 @@ def fit_with_prior(
     >>> np.abs(fit.initial).round(9), np.abs(fit.influence).round(9)
     (array([80.]), array([[2.]]))
     """
-    y, t = np.asarray(readings, dtype=complex), np.asarray(masses, dtype=complex)
+    y, t = as_vectors(readings), as_vectors(masses)
     if y.ndim < 2 or t.ndim < 2 or y.shape[:-1] != t.shape[:-1]:
         raise ValueError(f"shapes do not fit: readings {y.shape}, masses {t.shape}")
     if prior.mean.shape[-2:] != (y.shape[-1], t.shape[-1]):
@@ -200,12 +212,12 @@ def fit_with_prior(
     if not present.any(axis=-2).all():
         raise ValueError("a channel has no reading")
     plain = runs_alone(y, t)
-    stated = None if deviation is None else np.broadcast_to(np.asarray(deviation, dtype=float), y.shape)
     if deviation is None:
-        deviation = np.nan_to_num(plain.residual_sd)[..., None, None]
-    sd = np.swapaxes(
-        np.where(present, np.broadcast_to(np.asarray(deviation, dtype=float), y.shape), 0.0), -1, -2
-    )
+        scatter = plain.residual_sd[..., None, None]
+        each = np.where(np.isnan(scatter), 0.0, scatter)
+    else:
+        each = as_array(deviation)
+    sd = np.swapaxes(np.where(present, np.broadcast_to(each, y.shape), 0.0), -1, -2)
     read = np.swapaxes(present, -1, -2)
     typical = sd.sum(axis=-1) / read.sum(axis=-1)
     floor = np.maximum(sd, 1e-3 * typical[..., None])
@@ -214,51 +226,39 @@ def fit_with_prior(
     share = np.square(root) / np.square(root).sum(axis=-1, keepdims=True)
     w = t[..., None, :, :]
 
-    def centred(rows: Complex) -> Complex:
+    def centred(rows: Any) -> Any:
         """Take off x₀: root·(rows - their weighted mean)."""
-        return np.asarray(root[..., None] * (rows - share[..., None, :] @ rows))
+        return as_vectors(root[..., None] * (rows - share[..., None, :] @ rows))
 
     steps = centred(w) @ prior.root
     below = np.broadcast_to(
         typical[..., None, None] * np.eye(t.shape[-1]), (*steps.shape[:-2], *[t.shape[-1]] * 2)
     )
-    inverse = np.linalg.pinv(
-        np.concatenate([steps, below], axis=-2), rcond=threshold(y.shape[-2], t.shape[-1])
-    )
-    of_u = inverse[..., : y.shape[-2]]
-    of_alpha = prior.root @ of_u @ centred(np.eye(y.shape[-2], dtype=complex))
+    of_u = pseudo_inverse(np.concatenate([steps, below], axis=-2))[..., : y.shape[-2]]
+    of_alpha = prior.root @ of_u @ centred(np.eye(y.shape[-2]))
     of_alpha = np.where(read[..., None, :], of_alpha, 0.0)
     follows = np.eye(t.shape[-1]) - of_alpha @ w
-    of_initial = share[..., None, :] - share[..., None, :] @ w @ of_alpha
-    gain = np.concatenate([of_initial, of_alpha], axis=-2)
-    of_mean = np.concatenate([-share[..., None, :] @ w @ follows, follows], axis=-2)
+    on_average = share[..., None, :] @ w
+    gain = np.concatenate([share[..., None, :] - on_average @ of_alpha, of_alpha], axis=-2)
+    of_mean = np.concatenate([-on_average @ follows, follows], axis=-2)
     b = np.swapaxes(np.where(present, y, 0.0), -1, -2)
     unknowns = np.matvec(gain, b) + np.matvec(
         of_mean, np.broadcast_to(prior.mean, of_mean.shape[:-2] + t.shape[-1:])
     )
-    leverage = np.clip(np.einsum("...rn,...snr->...rs", design(t), gain).real, 0.0, 1.0)
+    leverage = np.clip(np.einsum("...rn,...snr->...rs", floats(design(t)), floats(gain)).real, 0.0, 1.0)
     nu = np.broadcast_to(prior.degrees_of_freedom, y.shape[:-2])
-    foreknown = Foreknown(plain, of_mean @ prior.factor, nu, partial(_again, plain, prior, stated))
-    return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=foreknown)
+    foreknown = Foreknown(plain, of_mean @ prior.factor, nu, partial(_again, y, t, prior, deviation))
+    return JointFit(y, t, None, as_vectors(unknowns + 0.0), gain, leverage, foreknown=foreknown)
 
 
-def _again(plain: JointFit, prior: Prior, deviation: Real | None) -> Vectors:
+def _again(readings: Complex, masses: Complex, prior: Prior, deviation: ArrayLike | None) -> Vectors:
     """Return the unknowns in 32 digits, of floats as exact."""
-    from balancing.log_again import ExactPrior, exact_fit, exact_prior_fit
-    from balancing.second_run import chosen
-    from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors, part
-
-    present = plain.present
-    readings, masses = Vectors.of(np.where(present, plain.readings, 0.0)), Vectors.of(plain.masses)
-    again = exact_fit(readings, masses, present, np.asarray(plain.degrees_of_freedom, dtype=float))
-    known = ExactPrior(*map(Vectors.of, (prior.mean, prior.factor, prior.root)))
-    if deviation is None:
-        scattered = np.nan_to_num(plain.residual_sd) > 0
-        each = part(chosen(scattered, again.residual_sd), (..., None, None)) * np.ones(present.shape)
-    else:
-        each = Doubled(np.where(present, deviation, 0.0))
-    return exact_prior_fit(again, readings, masses, present, known, each).unknowns
+    known = replace(
+        prior, **{name: in_32_digits(getattr(prior, name)) for name in ("mean", "factor", "root")}
+    )
+    sd = None if deviation is None else in_32_digits(np.asarray(deviation, dtype=float))
+    fit = fit_with_prior(in_32_digits(readings), in_32_digits(masses), known, sd)
+    return cast("Vectors", fit.unknowns)
 
 
 def runs_alone(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:
@@ -268,17 +268,18 @@ def runs_alone(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None
     >>> one.unknowns.real, int(one.degrees_of_freedom)
     (array([[5.1, 0. ]]), 1)
     """
-    y, t = np.asarray(readings, dtype=complex), np.asarray(masses, dtype=complex)
+    y, t = as_vectors(readings), as_vectors(masses)
     present = np.isfinite(y)
     w = None if weights is None else np.broadcast_to(np.asarray(weights, dtype=float), y.shape)
     root = np.swapaxes(present * (1.0 if w is None else np.sqrt(w)), -1, -2)
     scaled, scale = columns_scaled(root[..., None] * design(t)[..., None, :, :])
-    left, sigma, right = np.linalg.svd(scaled, full_matrices=False)
+    left, sigma, right = np.linalg.svd(floats(scaled), full_matrices=False)
     seen = sigma > threshold(*scaled.shape[-2:]) * sigma[..., :1]
     left = np.where(seen[..., None, :], left, 0.0)
     back = adjoint(right) / np.where(seen, sigma, 1.0)[..., None, :]
-    gain = scale[..., None] * (back @ adjoint(left)) * root[..., None, :]
+    inverse = pseudo_inverse(scaled) if is_doubled(scaled) else back @ adjoint(left)
+    gain = scale[..., None] * inverse * root[..., None, :]
     unknowns = np.matvec(gain, np.swapaxes(np.where(present, y, 0.0), -1, -2))
     leverage = np.swapaxes(np.square(np.abs(left)).sum(axis=-1), -1, -2)
     count = np.asarray(seen.sum(axis=(-2, -1)))
-    return JointFit(y, t, w, np.asarray(unknowns), gain, leverage, count=count)
+    return JointFit(y, t, w, as_vectors(unknowns), gain, leverage, count=count)

@@ -6,17 +6,21 @@ number, are never formed.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing.dependence import (
     DependentPlanes,
+    adjoint,
     columns_scaled,
-    damping_norms,
+    damped,
     require_independent,
     threshold,
 )
 from balancing.triangle import triangle
+from dalembert.arithmetic.shapes import as_vectors, is_doubled
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -46,8 +50,7 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     planes = a.shape[-1]
     scaled, scale = columns_scaled(a)
     if ridge:
-        norms = damping_norms(scaled)
-        scaled = np.concatenate([scaled, ridge * norms[..., None] * np.eye(planes)], axis=-2)
+        scaled = damped(scaled, ridge)
         b = np.concatenate([b, np.zeros((*b.shape[:-1], planes))], axis=-1)
     order = (-np.abs(scaled).max(axis=-1)).argsort(axis=-1, kind="stable")
     # of [a, b] R has Qᴴb in its last column
@@ -96,3 +99,24 @@ def factors(a: Complex) -> tuple[Complex, Complex, Real]:
     order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
     q, r = np.linalg.qr(np.take_along_axis(scaled, order[..., None], axis=-2))
     return np.take_along_axis(q, np.argsort(order, axis=-1)[..., None], axis=-2), r, scale
+
+
+def pseudo_inverse(a: Complex) -> Complex:
+    """Return A⁺ (..., n, m); its rank is that of the floats in 32 digits too."""
+    if not is_doubled(a):
+        return np.asarray(np.linalg.pinv(a, rcond=threshold(*a.shape[-2:])), dtype=complex)
+    from balancing import second_run
+
+    doubled: Any = a
+    return as_vectors(second_run.pseudo_inverse(doubled))
+
+
+def inverses(a: Complex) -> tuple[Complex, Complex]:
+    """Return A⁺ (..., n, m) and a B (..., n, k) with BBᴴ = (AᴴA)⁻¹: of A = QR R⁻¹, in 32 digits A⁺ again."""
+    if is_doubled(a):
+        inverse = pseudo_inverse(a)
+        return inverse, inverse
+    scale = 1 / np.linalg.norm(a, axis=-2)
+    q, r = np.linalg.qr(a * scale[..., None, :])
+    inverse = np.linalg.inv(r) * scale[..., None]
+    return inverse @ adjoint(q), inverse

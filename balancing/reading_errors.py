@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import adjoint, damping_norms, design, directions
+from balancing.dependence import adjoint, damped, design, directions
+from balancing.qr import inverses
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_array, floats
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -63,7 +65,7 @@ def response(
     left: Complex,
     weights: Real,
     ridge: float = 0.0,
-    damped: Complex | None = None,
+    along: Complex | None = None,
 ) -> tuple[Complex, Complex]:
     """Return how least-squares corrections follow x₀ and α: L and A, (..., p, s, 1 + p) each.
 
@@ -71,7 +73,7 @@ def response(
     ----------
     alpha, corrections, left, weights, ridge
         α (..., s, p), w (..., p), the residual e = x₀ + α w (..., s), and the weights (..., s) and λ they were found with.
-    damped
+    along
         What the ridge damps, (..., p): the corrections as given, where they are added to masses that stand; None: w.
 
     Notes
@@ -93,19 +95,15 @@ def response(
     """
     root = np.sqrt(weights)
     a = root[..., None] * alpha
-    if ridge:
-        norms = ridge * damping_norms(a)
-        a = np.concatenate([a, norms[..., None] * np.eye(norms.shape[-1])], axis=-2)
-    scale = 1 / np.linalg.norm(a, axis=-2)
-    q, r = np.linalg.qr(a * scale[..., None, :])
-    inverse = np.linalg.inv(r) * scale[..., None]
-    gain = (inverse @ adjoint(q))[..., : alpha.shape[-2]] * root[..., None, :]
-    m = inverse @ adjoint(inverse)
+    damps = bool(floats(ridge))
+    inverse, half = inverses(damped(a, ridge) if damps else a)
+    gain = inverse[..., : alpha.shape[-2]] * root[..., None, :]
+    m = half @ adjoint(half)
     linear = -gain[..., None] * design(corrections)[..., None, None, :]
     antilinear = np.zeros_like(linear)
     antilinear[..., 1:] = -m[..., :, None, :] * (weights * left)[..., None, :, None]
-    if ridge:
-        added = (corrections if damped is None else damped)[..., None, :]
+    if damps:
+        added = (corrections if along is None else along)[..., None, :]
         pull = ridge**2 * (weights[..., None] * alpha * added)[..., None, :, :]
         back = ridge**2 * (weights[..., None] * alpha.conj() * added)[..., None, :, :]
         antilinear[..., 1:] -= m[..., :, None, :] * pull
@@ -134,4 +132,4 @@ def components(
     aside = 1j * (turned - other) * across[..., None, :]
     parts = np.concatenate([radial, aside], axis=-1)
     parts = np.stack([parts.real, parts.imag], axis=-2)
-    return np.asarray(parts @ np.swapaxes(parts, -1, -2))
+    return as_array(parts @ np.swapaxes(parts, -1, -2))

@@ -6,17 +6,18 @@ and those of the minimax problem, are in `balancing.optimality`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import roundings
+from balancing.dependence import damped, roundings
 from balancing.influence import influence_coefficients
-from balancing.second_run import damped, smallest_squares
+from balancing.second_run import smallest_squares
 from dalembert.arithmetic.doubled import Doubled, doubled
+from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import Vectors, part
+from dalembert.arithmetic.doubled_operations import part
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -53,7 +54,7 @@ def influence_error(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLi
     # (..., s, r)
     change = Vectors.of(np.swapaxes(v0[..., None, :] + 0 * v, -1, -2)) - Vectors.of(np.swapaxes(v, -1, -2))
     exact = smallest_squares(Vectors.of(t[..., None, :, :]), change)[0]
-    return exact.apart(influence_coefficients(v0, v, t))
+    return exact.off(influence_coefficients(v0, v, t))
 
 
 class Problem(NamedTuple):
@@ -77,17 +78,19 @@ class Problem(NamedTuple):
 
     def residual(self, corrections: Vectors) -> Vectors:
         """V + α w."""
-        return self.initial + (self.influence * corrections[..., None, :]).total()
+        return self.initial + (self.influence * corrections[..., None, :]).sum()
 
 
 def least_squares_again(problem: Problem, ridge: float | Doubled) -> Vectors:
     """Return the corrections of a least-squares problem without limits in 32 digits."""
-    a, b = problem.influence, problem.initial
+    a: Any = problem.influence
+    b, ridge = problem.initial, doubled(ridge)
     if problem.weights is not None:
         of_rows = DOUBLED.sqrt(Doubled(np.asarray(problem.weights, dtype=float)))
         a, b = a * part(of_rows, (..., None)), b * of_rows
-    if doubled(ridge).high:
-        a = damped(ridge, a)
+    if ridge.high:
+        of_columns: Any = DoubledArray.of(ridge)
+        a = damped(a, of_columns)
         lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
         b = Vectors.joined(
             [b + Vectors.of(np.zeros((*lead, 1))), Vectors.of(np.zeros((*lead, a.shape[-1])))], axis=-1

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,13 +26,21 @@ from balancing.qr import factors
 from balancing.reading_errors import Errors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
-from dalembert.arithmetic.shapes import spread_to
+from dalembert.arithmetic.shapes import (
+    as_array,
+    as_vectors,
+    filled,
+    floats,
+    in_32_digits,
+    is_doubled,
+    spread_to,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
     from matplotlib.projections.polar import PolarAxes
 
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -127,9 +135,9 @@ class JointFit:
     def residuals(self) -> Complex:
         """Reading less fitted value, (..., r, s); NaN where there is no reading, 0 within rounding."""
         left = self.readings - self.fitted(self.masses)
-        size = np.abs(design(self.masses)) @ np.swapaxes(np.abs(self.unknowns), -1, -2)
-        noise = 16 * EPS * (np.abs(self.readings) + size)
-        return np.asarray(np.where(np.abs(left) <= noise, 0.0, left))
+        size = np.abs(design(floats(self.masses))) @ np.swapaxes(np.abs(floats(self.unknowns)), -1, -2)
+        noise = 16 * EPS * (np.abs(floats(self.readings)) + size)
+        return as_vectors(np.where(np.abs(floats(left)) <= noise, 0.0, left))
 
     def again(self, readings: Complex) -> JointFit:
         """Return the fit of other readings of the same channels in the same runs, (..., r, s)."""
@@ -152,8 +160,7 @@ class JointFit:
 
     def fitted(self, masses: ArrayLike) -> Complex:
         """Return the vibration with these masses on, (..., k, p) -> (..., k, s)."""
-        rows = design(np.asarray(masses, dtype=complex))
-        return np.asarray(rows @ np.swapaxes(self.unknowns, -1, -2))
+        return as_vectors(design(as_vectors(masses)) @ np.swapaxes(self.unknowns, -1, -2))
 
     @cached_property
     def degrees_of_freedom(self) -> NDArray[np.intp]:
@@ -169,13 +176,13 @@ class JointFit:
         if self.foreknown is not None:
             return self.alone.sum_of_squares
         square = np.square(np.abs(np.where(self.present, self.residuals, 0.0)))
-        return np.asarray((square if self.weights is None else self.weights * square).sum(axis=(-2, -1)))
+        return as_array((square if self.weights is None else self.weights * square).sum(axis=(-2, -1)))
 
     @cached_property
     def residual_sd(self) -> Real:
         """s = √(Σ weight·|residual|²/ν), (...); NaN where no degree of freedom is left."""
         left = np.asarray(self.degrees_of_freedom, dtype=float)
-        return np.asarray(np.sqrt(self.sum_of_squares / np.where(left > 0, left, np.nan)))
+        return as_array(np.sqrt(self.sum_of_squares / np.where(left > 0, left, np.nan)))
 
     @cached_property
     def standardized(self) -> Real:
@@ -198,22 +205,23 @@ class JointFit:
         >>> bool((fit.error_estimate() < 1e-14).all())
         True
         """
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         if self.foreknown is not None:
-            return self.foreknown.again().apart(self.unknowns)
+            return self.foreknown.again().off(self.unknowns)
         readings = Vectors.of(np.where(self.present, self.readings, 0.0))
-        return self.second_run(readings, Vectors.of(self.masses)).apart(self.unknowns)
+        return self.second_run(readings, Vectors.of(self.masses)).off(self.unknowns)
 
     def second_run(self, readings: Vectors, masses: Vectors) -> Vectors:
         """Return the unknowns (..., s, 1 + p) in 32 digits, of readings (..., r, s) and masses (..., r, p) in 32 digits.
 
-        Where a reading is missing any number stands. Of the runs alone: with prior knowledge see `balancing.log_again`.
+        Where a reading is missing any number stands. Of the runs alone: prior knowledge has its own (`Foreknown.again`).
         """
         from balancing.second_run import smallest_squares
         from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.arithmetic.doubled_functions import DOUBLED
-        from dalembert.arithmetic.doubled_vectors import Vectors, part
+        from dalembert.arithmetic.doubled_operations import part
 
         weights = np.where(self.present, 1.0 if self.weights is None else self.weights, 0.0)
         of_rows = DOUBLED.sqrt(Doubled(np.swapaxes(weights, -1, -2)))
@@ -231,7 +239,8 @@ class JointFit:
 
     def known(self, sd: ArrayLike, degrees_of_freedom: ArrayLike = np.inf) -> Errors:
         """Return errors of √E|ε|² = sd, (...), with this number of complex degrees of freedom."""
-        each = np.broadcast_to(np.asarray(sd, dtype=float)[..., None, None] / np.sqrt(2), self.readings.shape)
+        each = as_array(sd)[..., None, None]
+        each = np.broadcast_to(each / np.sqrt(filled((), 2.0, each)), self.readings.shape)
         nu = np.broadcast_to(np.asarray(degrees_of_freedom, dtype=float), self.readings.shape[:-2])
         return Errors(np.ones(self.readings.shape, dtype=complex), each, each, nu)
 
@@ -239,9 +248,8 @@ class JointFit:
         """Return errors that are known: relative ones of the amplitude, and those of the phase in rad."""
         read = np.where(self.present, self.readings, 0.0)
         unit, size = directions(read), np.abs(read)
-        degrees = np.full(self.readings.shape[:-2], np.inf)
-        turn = np.full(size.shape, phase)
-        return Errors(unit, amplitude * size, phase * size, degrees, turn, np.ones(size.shape, dtype=bool))
+        degrees, ones = np.full(self.readings.shape[:-2], np.inf), np.ones(size.shape)
+        return Errors(unit, amplitude * size, phase * size, degrees, phase * ones, ones > 0)
 
 
 def _of_machine(again: Callable[[], Vectors], i: int) -> Vectors:
@@ -249,7 +257,7 @@ def _of_machine(again: Callable[[], Vectors], i: int) -> Vectors:
 
 
 def _without(again: Callable[[], Vectors], runout: Complex) -> Vectors:
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
     unknowns = again()
     unknowns[..., 0] = unknowns[..., 0] - Vectors.of(runout)
@@ -367,15 +375,15 @@ def initial_alone(readings: ArrayLike, influence: ArrayLike) -> JointFit:
     >>> fit.unknowns.real, int(fit.degrees_of_freedom)
     (array([[6., 2.]]), 1)
     """
-    y, alpha = np.asarray(readings, dtype=complex), np.asarray(influence, dtype=complex)
+    y, alpha = as_vectors(readings), as_vectors(influence)
     present = np.isfinite(y)
     count = present.sum(axis=-2, keepdims=True)
     if not count.all():
         raise ValueError("a channel has no reading")
-    share = np.where(present, 1 / count, 0.0)
+    share = np.where(present, 1 / (in_32_digits(count) if is_doubled(y) else count), 0.0)
     x0 = (np.where(present, y, 0.0).sum(axis=-2) / count[..., 0, :])[..., None]
     unknowns = np.concatenate([x0, np.broadcast_to(alpha, (*x0.shape[:-1], alpha.shape[-1]))], axis=-1)
-    gain = np.zeros((*unknowns.shape, y.shape[-2]))
+    gain: Any = filled((*unknowns.shape, y.shape[-2]), 0.0, share)
     gain[..., 0, :] = np.swapaxes(share, -1, -2)
     masses = np.zeros((*y.shape[:-1], alpha.shape[-1]), dtype=complex)
     counts = np.full(y.shape[:-2], y.shape[-1])

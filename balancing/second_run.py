@@ -7,15 +7,16 @@ A x + b = r with Σ|r|² least, by Gram and Schmidt's orthogonalisation in its m
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import damping_norms, threshold
+from balancing.dependence import threshold
 from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.doubled_arrays import Vectors
 from dalembert.arithmetic.doubled_functions import DOUBLED
-from dalembert.arithmetic.doubled_vectors import Vectors, part, total
+from dalembert.arithmetic.doubled_operations import part, total
 
 Real = NDArray[np.float64]
 
@@ -33,12 +34,12 @@ class ExactMasses(NamedTuple):
     @property
     def static(self) -> Vectors:
         """Σ U."""
-        return self.moment.total()
+        return self.moment.sum()
 
     def about(self, z: Doubled) -> Vectors:
         """Σ U (z_i - z) for positions z (..., q)."""
         arms = part(self.z, (..., None, slice(None))) - part(z, (..., None))
-        return (self.moment[..., None, :] * arms).total()
+        return (self.moment[..., None, :] * arms).sum()
 
     @property
     def corrections(self) -> Vectors:
@@ -48,13 +49,13 @@ class ExactMasses(NamedTuple):
         apart = part(self.planes, (..., slice(None), None)) - part(self.planes, (..., None, slice(None)))
         square = total(total(apart * apart)) / 2.0
         moments = self.about(self.planes)
-        return -((moments[..., None, :] * apart).total() / part(square, (..., None)))
+        return -((moments[..., None, :] * apart).sum() / part(square, (..., None)))
 
     def residual(self, made: Vectors, about: Doubled) -> tuple[Vectors, Vectors]:
         """Return the residual of corrections as made (..., p): Σ U + Σ W, and the couple about a position (...)."""
         lever = self.planes - part(about, (..., None))
-        couple = self.about(part(about, (..., None)))[..., 0] + (made * lever).total()
-        return self.static + made.total(), couple
+        couple = self.about(part(about, (..., None)))[..., 0] + (made * lever).sum()
+        return self.static + made.sum(), couple
 
 
 class ExactParts:
@@ -65,7 +66,7 @@ class ExactParts:
         parts, left = smallest_squares(rows, -readings)
         # rotor and mounting
         self.parts, self.residuals = parts[::-1], -left
-        apart = turn - (turn.total() / np.array(float(turn.shape[0])))[None]
+        apart = turn - (turn.sum() / np.array(float(turn.shape[0])))[None]
         self.size = total(apart.square)
 
     @property
@@ -88,7 +89,7 @@ def smallest_squares(a: Vectors, b: Vectors) -> tuple[Vectors, Vectors]:
     columns, upper = _orthogonal(a)
     shares: list[Vectors] = []
     for q in columns:
-        share = (q.conj * b).total() / total(q.square)
+        share = (q.conj() * b).sum() / total(q.square)
         b = b - q * share[..., None]
         shares.append(share)
     x: list[Vectors] = []
@@ -109,13 +110,13 @@ def least_norm(a: Vectors, b: Vectors) -> Vectors:
     array([1., 2.])
     """
     columns, upper = _orthogonal(
-        Vectors.joined([a[..., k, :, None].conj for k in range(a.shape[-2])], axis=-1)
+        Vectors.joined([a[..., k, :, None].conj() for k in range(a.shape[-2])], axis=-1)
     )
     shares: list[Vectors] = []
     for k in range(len(columns)):
         share = -b[..., k]
         for j, before in enumerate(shares):
-            share = share - upper[j][k - j - 1].conj * before
+            share = share - upper[j][k - j - 1].conj() * before
         shares.append(share)
     x = columns[0] * (shares[0] / total(columns[0].square))[..., None]
     for q, share in zip(columns[1:], shares[1:], strict=True):
@@ -128,22 +129,13 @@ def _orthogonal(a: Vectors) -> tuple[list[Vectors], list[list[Vectors]]]:
     columns = [a[..., k] for k in range(a.shape[-1])]
     upper: list[list[Vectors]] = []
     for k, q in enumerate(columns):
-        back, square = q.conj, total(q.square)
+        back, square = q.conj(), total(q.square)
         upper.append([])
         for j in range(k + 1, len(columns)):
-            share = (back * columns[j]).total() / square
+            share = (back * columns[j]).sum() / square
             columns[j] = columns[j] - q * share[..., None]
             upper[k].append(share)
     return columns, upper
-
-
-def damped(ridge: float | Doubled, a: Vectors) -> Vectors:
-    """Return A (..., m, n) with the rows λ‖A_k‖ of a ridge below it."""
-    norms, n = DOUBLED.sqrt(total(a.square, -2)), a.shape[-1]
-    given = norms.high > 0
-    norms = Doubled(np.where(given, norms.high, damping_norms(a.value)), np.where(given, norms.low, 0.0))
-    below = part(norms * ridge, (..., None)) * np.eye(n)
-    return Vectors.joined([a, Vectors(below, below * 0.0)], axis=-2)
 
 
 def pseudo_inverse(a: Vectors) -> Vectors:
@@ -166,7 +158,7 @@ def pseudo_inverse(a: Vectors) -> Vectors:
         orthogonal, upper = _orthogonal(a)
         x: list[Vectors] = []
         for q, row in zip(reversed(orthogonal), reversed(upper), strict=True):
-            value = q.conj / part(total(q.square), (..., None))
+            value = q.conj() / part(total(q.square), (..., None))
             for share, below in zip(row, reversed(x), strict=True):
                 value = value - below * share[..., None]
             x.append(value)
@@ -195,19 +187,29 @@ def _independent(a: NDArray[np.complex128], rank: int) -> list[int]:
     return sorted(numbers)
 
 
-def chosen(where: NDArray[np.bool_], a: Doubled, otherwise: float | Real = 0.0) -> Doubled:
-    """Return a, and plain numbers elsewhere."""
-    return Doubled(np.where(where, a.high, otherwise), np.where(where, a.low, 0.0))
+def root_of(covariance: Vectors) -> Vectors:
+    """Return Cholesky's root (..., p, p) of covariances, which may be singular."""
+    root = Vectors.of(np.zeros(covariance.shape))
+    for j in range(covariance.shape[-1]):
+        for i in range(j, covariance.shape[-1]):
+            rest: Any = covariance[..., i, j] - (root[..., i, :j] * root[..., j, :j].conj()).sum()
+            if i == j:
+                # what is left in the rounding of 32 digits is nothing
+                some = rest.x.high > 1e-28 * covariance[..., j, j].x.high
+                size = np.sqrt(np.where(some, rest.real, 1.0))
+                rest = rest.real
+            root[..., i, j] = rest / size * some.astype(float)
+    return root
 
 
 def product(a: Vectors, b: Vectors) -> Vectors:
     """Return A B, (..., l, m) and (..., m, n)."""
-    return (a[..., :, :, None] * b[..., None, :, :]).total(-2)
+    return (a[..., :, :, None] * b[..., None, :, :]).sum(-2)
 
 
 def applied(a: Vectors, x: Vectors) -> Vectors:
     """Return A x, (..., m, n) and (..., n)."""
-    return (a * x[..., None, :]).total()
+    return (a * x[..., None, :]).sum()
 
 
 def spline(x: Doubled, y: Doubled, z: Doubled) -> Doubled:

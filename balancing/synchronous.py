@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.marks import Marks, floats, marks
+from balancing.marks import Marks, marks
 from dalembert.arithmetic.records import record
-from dalembert.arithmetic.shapes import filled, in_32_digits, is_doubled
+from dalembert.arithmetic.shapes import filled, floats, in_32_digits, is_doubled
 from dalembert.dataclass import dataclass, field, replace
 
 Real = NDArray[np.float64]

@@ -12,7 +12,7 @@ from balancing.placement import Placement, checked_positions
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -297,7 +297,7 @@ def place_weights(target: complex, weights: ArrayLike) -> Placement:
 def angles_again(placed: Placement, target: Vectors, weights: Doubled) -> Doubled:
     """Return the angles (n,) of `place_weights` in 32 digits, rad; NaN where the polygon is so flat that they are not reached."""
     from dalembert.arithmetic.doubled import PI, Doubled
-    from dalembert.arithmetic.doubled_vectors import part, total
+    from dalembert.arithmetic.doubled_operations import part, total
 
     size, masses = abs(placed.target), placed.masses
     toward = target[None].angle if size else Doubled(np.zeros(1))
@@ -325,7 +325,7 @@ def _arcs_again(sides: Doubled, arcs: Real) -> Doubled:
     """Return the arcs in 32 digits, by Newton's method from those in 16; NaN where it does not converge."""
     from dalembert.arithmetic.doubled import PI, Doubled
     from dalembert.arithmetic.doubled_functions import DOUBLED
-    from dalembert.arithmetic.doubled_vectors import part, total
+    from dalembert.arithmetic.doubled_operations import part, total
 
     longest = int(sides.high.argmax())
     share = part(sides, np.delete(np.arange(len(arcs)), longest)) / part(sides, longest)

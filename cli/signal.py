@@ -239,10 +239,8 @@ def vectors(recording: Recording) -> Table:
         [
             names("sensor", recording.sensors),
             number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
-            column("amplitude", np.abs(of.vector), lambda: recording.second.vector.vectors.size),
-            number(
-                "phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.vectors.degrees
-            ),
+            column("amplitude", np.abs(of.vector), lambda: recording.second.vector.size),
+            number("phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.degrees),
             column("amplitude_uncertainty", of.deviation, lambda: recording.second.deviation.doubled),
             names("turns", [of.turns] * rows),
         ],

@@ -354,9 +354,9 @@ def _column(numbers: list[Decimal], like: Array) -> Array:
 def _complex(x: Any, y: Any) -> Any:
     """x + iy."""
     if is_doubled(x):
-        from dalembert.arithmetic.doubled_arrays import DoubledComplex
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
-        return DoubledComplex(x, y)
+        return Vectors.of_parts(x, y)
     return x + 1j * y
 
 

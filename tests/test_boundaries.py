@@ -50,8 +50,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("sheet",),
         ("tapes",),
         ("optimality",),
-        ("limited", "log_again", "rounding"),
-        ("influence", "modal", "qr", "reading_errors", "second_run"),
+        ("limited", "rounding"),
+        ("influence", "modal", "reading_errors"),
+        ("qr",),
+        ("second_run",),
         (
             "checked_data",
             "cone_problem",

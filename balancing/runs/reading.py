@@ -22,7 +22,7 @@ from dalembert.tables.table import Cells, Numbers, Table, numbered
 from dalembert.units import LARGEST, SMALLEST, UNITS, to_si
 
 if TYPE_CHECKING:
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 T = TypeVar("T", complex, "Vectors")
 Flags = NDArray[np.bool_]
@@ -150,7 +150,8 @@ class _Reading:
 
     def _exact(self) -> Vectors:
         """Return what each row reads in 32 digits, of the decimals as they are written; 0 where it is blank."""
-        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+        from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_operations import doubled_array
         from dalembert.tables.exact import vectors
 
         numbers = self.table.numbers
@@ -161,7 +162,7 @@ class _Reading:
             exact = doubled_array(size.decimals, size.values.shape)
             return Vectors(exact, exact * 0.0)
         result = vectors(size.decimals, phase[0])
-        return result.conj if self.against else result
+        return result.conj() if self.against else result
 
     def _vibration(self) -> Complex:
         """Return what each row reads, NaN where it is blank."""
@@ -354,7 +355,7 @@ def first_of_run(of_run: Rows, rows: Flags) -> Rows:
 
 def _added(each: Vectors, entry: Rows, count: int) -> Vectors:
     """Add up vectors (k,) of like entries."""
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
     total = Vectors.of(np.zeros(count))
     order = np.argsort(entry, kind="stable")

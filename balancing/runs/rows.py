@@ -15,7 +15,7 @@ from dalembert.errors import DataError
 from dalembert.tables.table import numbered
 
 if TYPE_CHECKING:
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
     OfRows = list[dict[str, Vectors] | None]
 
@@ -57,7 +57,7 @@ class Masses(NamedTuple):
         at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
 
         def values() -> Vectors:
-            from dalembert.arithmetic.doubled_vectors import Vectors
+            from dalembert.arithmetic.doubled_arrays import Vectors
 
             if exact is None or not entries:
                 return Vectors.of(np.array(value, dtype=complex))
@@ -195,7 +195,7 @@ class Sorted:
     @cached_property
     def _exactly_on(self) -> Vectors:
         """`on` in 32 digits."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         run, place, entry = self._puts
         on = Vectors.of(np.zeros(self.on.shape))
@@ -343,7 +343,7 @@ class Sorted:
         stand: tuple[Rows, Rows],
     ) -> Exact:
         """Lay the same rows side by side in 32 digits."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         readings = Vectors.of(np.zeros(shape))
         readings[cells] = self.rows.exact()[source]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,9 @@ from dalembert.units import UNITS, amplitude_kind, from_si, to_si
 if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit
     from balancing.doubt import Drift
-    from balancing.log_again import ExactFit, ExactPrior
     from balancing.prior import Prior
     from balancing.run_log import JointFit
-    from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -96,7 +94,7 @@ class Before:
     """Between machines, as a share of the coefficients; None of one machine."""
     reading: tuple[float, float] | None
     """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
-    exact: Callable[[], tuple[ExactPrior, Doubled]]
+    exact: Callable[[], tuple[Prior, Any]]
     """The coefficients and that deviation in 32 digits, as the files have them; computed on request."""
 
 
@@ -207,30 +205,24 @@ class Group:
         """Readings, masses and standing, once the fit has shown the sense of the phases."""
         return self.exact()
 
-    def exact_scatter(self, fit: ExactFit) -> Doubled:
+    def exact_scatter(self, fit: JointFit) -> Any:
         """Return the deviation of the readings in 32 digits, (g,): as residuals scatter, or as those of sisters did, or none."""
-        from balancing.second_run import chosen
-        from dalembert.arithmetic.doubled import Doubled
-
         sd, estimated = self.fit.residual_sd, np.asarray(self.fit.degrees_of_freedom > 0)
-        scatter = chosen(estimated & (sd > 0), fit.residual_sd)
+        scatter = np.where(estimated & (sd > 0), fit.residual_sd, 0.0)
         if self.before is None or self.before.reading is None:
             return scatter
-        before = self.before.exact()[1]
-        return Doubled(
-            *(np.where(estimated, *both) for both in ((scatter.high, before.high), (scatter.low, before.low)))
-        )
+        return np.where(estimated, scatter, self.before.exact()[1])
 
     def exact_of_amplitudes(self, i: int) -> Vectors:
         """Return the coefficients of a rotor without phase in 32 digits, (s, p)."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         readings, masses, _ = self.in_32_digits
         read = np.isfinite(self.readings[i]).astype(float)
 
         def mean(rows: list[int]) -> Vectors:
             counts: Real = read[rows].sum(axis=0)
-            means: Vectors = ((readings[i, rows] * read[rows]).total(0) / counts)[None]
+            means: Vectors = ((readings[i, rows] * read[rows]).sum(0) / counts)[None]
             return means
 
         first = mean([j for of in self.lines.rows for j in of if not self.masses[i, j].any()])
@@ -262,7 +254,7 @@ class Exact(NamedTuple):
 
     def in_planes(self, own: list[int], there: list[int], count: int) -> Exact:
         """Return the same with the masses of the planes `own` in the planes `there` of so many."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         masses, standing = (
             Vectors.of(np.zeros((*of.shape[:-1], count))) for of in (self.masses, self.standing)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from balancing.prior import pooled_prior, stored_prior
+from balancing.prior import Prior, pooled_prior, stored_prior
 from balancing.runs.runs import Before, Channel, Complex, Real, Rows, Runs, apart
 from balancing.runs.vectors import Alpha, alpha_of
 from dalembert.angles import phasor
@@ -20,9 +20,8 @@ from dalembert.units import UNITS, from_si
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from balancing.log_again import ExactPrior
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 
 def read_runout(path: str, runs: Runs) -> dict[str, complex]:
@@ -145,8 +144,9 @@ class Stored:
         from fractions import Fraction
 
         from dalembert.arithmetic.doubled import PI, Doubled
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.arithmetic.doubled_functions import DOUBLED
-        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+        from dalembert.arithmetic.doubled_operations import doubled_array, part
         from dalembert.tables.exact import vectors
 
         table, at = self.table, self._rows_of(rotor, channels, planes)
@@ -178,7 +178,7 @@ class Stored:
         for (s, p, q), (size, angle) in correlation.items():
             numbers = Numbers("", "deg", np.array([angle]), "angle")
             share[s, p, q] = vectors([Fraction(repr(size))], numbers)[0]
-            share[s, q, p] = share[s, p, q].conj
+            share[s, q, p] = share[s, p, q].conj()
         return alpha, share * part(sizes, (..., None)) * part(sizes, (..., None, slice(None))), sd
 
     def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Complex:
@@ -419,21 +419,19 @@ class Sisters:
             scatter = (float(np.sqrt((weight * np.square(sds)).sum() / weight.sum())), freedom)
         between = float(prior.scatter)
 
-        def exact() -> tuple[ExactPrior, Doubled]:
-            from balancing.log_again import exact_pooled, exact_stored
+        def exact() -> tuple[Prior, Any]:
             from dalembert.arithmetic.doubled import Doubled
-            from dalembert.arithmetic.doubled_functions import DOUBLED
-            from dalembert.arithmetic.doubled_vectors import Vectors
+            from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 
             known = [one.exact_coefficients(name, channels, planes, runs) for one, name in machines]
             alphas, covariances, _ = zip(*known, strict=True)
-            alpha, covariance = (Vectors.joined([of[None] for of in part]) for part in (alphas, covariances))
+            exactly: Any = [Vectors.joined([of[None] for of in part]) for part in (alphas, covariances)]
             square = sum(
                 (sd * sd * w for (_, _, sd), w in zip(known, weight.tolist(), strict=True)), Doubled(0.0)
             )
-            reading = DOUBLED.sqrt(square / (float(weight.sum()) or 1.0))
+            reading = np.sqrt(DoubledArray.of(square / (float(weight.sum()) or 1.0)))
             if len(known) > 1:
-                return exact_pooled(alpha, covariance), reading
-            return exact_stored(alpha[0], covariance[0]), reading
+                return pooled_prior(*exactly), reading
+            return stored_prior(*(of[0] for of in exactly)), reading
 
         return Before(prior, len(each), between if between == between else None, scatter, exact)

@@ -71,7 +71,7 @@ class Modes:
         """Return the same rows in 32 digits."""
         from balancing.second_run import spline
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import part
+        from dalembert.arithmetic.doubled_operations import part
 
         x, y = self.exact()
         rows = spline(x, y, z)
@@ -128,7 +128,7 @@ def read_modes(path: str, count: int | None, rigid: bool) -> Modes:
         raise DataError(f"{table.file}: one station along the shaft: expected two at least")
 
     def exact() -> tuple[Doubled, Doubled]:
-        from dalembert.arithmetic.doubled_vectors import doubled_array
+        from dalembert.arithmetic.doubled_operations import doubled_array
 
         places, values = table.numbers["z"].exact, table.numbers["shape"].exact
         there = dict(zip(at.tolist(), places, strict=True))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from balancing import ModalCorrection
     from cli.balance.modes import Modes
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -369,7 +369,8 @@ class Balancing:
 
         from balancing.second_run import ExactMasses, least_norm
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array, part
+        from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_operations import doubled_array, part
         from dalembert.tables.exact import writtens
 
         rotors, none = self.rotors, Doubled(np.zeros(1))
@@ -388,7 +389,7 @@ class Balancing:
                 continue
             # where there is no mass any place will do
             at.high[masses < 0], at.low[masses < 0] = modes.z[0], 0.0
-            modal = (moment[masses][..., None, :] * modes.exactly_at(at)).total()
+            modal = (moment[masses][..., None, :] * modes.exactly_at(at)).sum()
             shapes = modes.exactly_at(there)
             result[rows] = least_norm(Vectors(shapes, shapes * 0.0), modal)
         return result

@@ -17,7 +17,7 @@ from rigidbody3d.shaft import shaft_axes
 
 if TYPE_CHECKING:
     from balancing import Correction
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -237,7 +237,7 @@ class MovingBody:
     def exact_correction(self) -> Vectors:
         """The corrections to 32 digits, (p,)."""
         from balancing.second_run import ExactMasses
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.tables.exact import writtens
 
         shaft: Any = self.second.shaft
@@ -247,7 +247,7 @@ class MovingBody:
     @cached_property
     def correction_errors(self) -> list[CorrectionMass]:
         """The errors of the masses of the correction planes."""
-        from dalembert.arithmetic.doubled_vectors import off
+        from dalembert.arithmetic.doubled_operations import off
         from dalembert.tables.exact import writtens
 
         fix, exact = self.correction, self.exact_correction

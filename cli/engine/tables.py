@@ -55,7 +55,7 @@ def polar(e: Engine, name: str, dimension: str, of: Of, unit: str = "", angle: s
     """Sizes and angles of vectors."""
     return [
         computed(e, name, dimension, lambda e: np.abs(of(e)), unit),
-        number(angle, "angle", degrees(of(e)), exact=lambda: of(e.second).vectors.degrees),
+        number(angle, "angle", degrees(of(e)), exact=lambda: of(e.second).degrees),
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from balancing import (
     joint_fit,
     phase_sense,
 )
+from balancing.prior import runs_alone
+from balancing.reading_errors import Errors
 from balancing.runs.reading import Measured, read_measured
 from balancing.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
 from balancing.runs.stored import Stored, read_runout
@@ -27,8 +29,7 @@ from cli.read.rotor_options import Tolerance
 from dalembert.errors import DataError, quote
 
 if TYPE_CHECKING:
-    from balancing.log_again import ExactErrors, ExactFit
-    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
 
 Flags = NDArray[np.bool_]
 
@@ -334,55 +335,42 @@ class _Groups:
         return fit
 
 
-def exact_fit(group: Group, runs: Runs, request: Request, stored: Stored | None) -> ExactFit:
+def exact_fit(group: Group, runs: Runs, request: Request, stored: Stored | None) -> JointFit:
     """Return the fit of a group in 32 digits, of readings, masses and coefficients as they are written."""
-    from balancing import log_again
-    from dalembert.arithmetic.doubled_functions import hypot
-    from dalembert.arithmetic.doubled_vectors import Vectors, part
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
-    readings, masses, _ = group.in_32_digits
-    present, freedom = group.fit.present, np.asarray(group.fit.degrees_of_freedom, dtype=float)
+    exact: Any = group.in_32_digits
+    readings, masses = np.where(group.fit.present, exact.readings, np.nan), exact.masses
     if stored is not None or group.amplitude_fits:
-        alpha = Vectors.of(np.zeros(group.fit.influence.shape))
+        alpha: Any = Vectors.of(np.zeros(group.fit.influence.shape))
         for i, r in enumerate(group.rotors.tolist()):
             if stored is not None:
                 alpha[i] = stored.exact_matrix(runs.rotors[r], group.channels, runs)
             else:
                 alpha[i] = group.exact_of_amplitudes(i)
-        return log_again.exact_mean(readings, present, alpha, freedom)
-    plain = log_again.exact_fit(readings, masses, present, freedom)
+        return initial_alone(readings, alpha)
+    plain = runs_alone(readings, masses)
     if group.before is None:
         return plain
-    deviation = part(group.exact_scatter(plain), (..., None, None)) * np.ones(present.shape)
+    deviation = group.exact_scatter(plain)[..., None, None]
     if request.reading_error is not None:
-        deviation = readings.size * hypot(*_as_stated(request.reading_error))
-    return log_again.exact_prior_fit(plain, readings, masses, present, group.before.exact()[0], deviation)
+        deviation = np.abs(readings) * np.hypot(*_as_stated(request.reading_error))
+    return fit_with_prior(readings, masses, group.before.exact()[0], deviation)
 
 
-def exact_errors(group: Group, request: Request, fit: ExactFit) -> ExactErrors:
+def exact_errors(group: Group, request: Request, fit: JointFit) -> Errors:
     """Return the errors of the readings in 32 digits: stated, or as they scatter."""
-    from balancing.log_again import ExactErrors
-    from balancing.second_run import chosen
-    from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_functions import DOUBLED
-    from dalembert.arithmetic.doubled_vectors import Vectors, part
-
-    readings = group.in_32_digits.readings
-    if request.reading_error is None:
-        ones = np.ones(readings.shape)
-        each = part(group.exact_scatter(fit) * DOUBLED.sqrt(Doubled(np.array(0.5))), (..., None, None)) * ones
-        return ExactErrors(Vectors.of(ones), each, each)
-    (amplitude, phase), size = _as_stated(request.reading_error), readings.size
-    some = size.high > 0
-    unit = readings / chosen(some, size, 1.0) + Vectors.of(~some)
-    return ExactErrors(unit, size * amplitude, size * phase)
+    if request.reading_error is not None:
+        stated: Any = _as_stated(request.reading_error)
+        return fit.stated(*stated)
+    return fit.known(group.exact_scatter(fit))
 
 
-def _as_stated(errors: tuple[float, float]) -> tuple[Doubled, Doubled]:
+def _as_stated(errors: tuple[float, float]) -> tuple[DoubledArray, DoubledArray]:
     """Return the standard deviations that --reading-error states, as written: relative (amplitude), and in rad (phase)."""
-    from dalembert.tables.exact import rates, writtens
+    from dalembert.tables.exact import array, rates
 
-    return writtens(errors[0]), rates(errors[1]).doubled
+    return array(errors[0]), rates(errors[1])
 
 
 def _missing(planes: list[str], masses: Complex) -> str:

@@ -5,25 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing import Balance
+from balancing import Balance, LogBalance
 from balancing.runs.runs import Channel, Complex, Real
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.fit import exact_errors, exact_fit
 from cli.field.remarks import conventions
 from cli.field.rotor import Rotor, Trim, each
 from dalembert.angles import degrees
+from dalembert.arithmetic.shapes import in_32_digits
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.text import angle_text
 from dalembert.units import from_si, written
 
 if TYPE_CHECKING:
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 
 Tables = dict[str, Callable[[], Table]]
 
@@ -186,7 +187,7 @@ def corrections(b: FieldBalancing, warnings: list[str]) -> Table:
         return Doubled(*again()[2 * k : 2 * k + 2])
 
     def exact(k: int) -> Vectors:
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         return Vectors(doubled(2 * k), doubled(2 * k + 1))
 
@@ -218,13 +219,13 @@ class SecondRun:
 
     def __init__(self, balancing: FieldBalancing, solved: Solved) -> None:
         self.balancing, self.solved, self.group = balancing, solved, solved.group
-        self.fit = exact_fit(solved.group, balancing.runs, balancing.request, balancing.stored)
+        self.raw = exact_fit(solved.group, balancing.runs, balancing.request, balancing.stored)
+        self.fit = self.raw.without(self._runout())
         self.standing = self.group.in_32_digits.standing
 
-    @cached_property
-    def initial(self) -> Vectors:
-        """The vibration without masses, run-out off, (g, s)."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+    def _runout(self) -> Any:
+        """The run-out of each channel, (g, s)."""
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         runout, exact = Vectors.of(self.balancing.runout(self.group)), self.balancing.runs.exact_runout
         if exact is not None:
@@ -233,19 +234,24 @@ class SecondRun:
                 if channel.sensor in vectors:
                     read = vectors[channel.sensor]
                     runout[:, s] = Vectors(read.x + 0.0 * sign, read.y * sign)
-        return self.fit.unknowns[..., 0] - runout
+        return runout
+
+    @property
+    def initial(self) -> Vectors:
+        """The vibration without masses, run-out off, (g, s)."""
+        return cast("Vectors", self.fit.initial)
 
     @cached_property
     def here(self) -> Vectors:
         """The vibration where the corrections start from, (g, s)."""
         if not self.solved.start.any():
             return self.initial
-        return self.initial + (self.alpha * self.standing[:, None, :]).total()
+        return self.initial + (self.alpha * self.standing[:, None, :]).sum()
 
     @property
     def alpha(self) -> Vectors:
         """The influence coefficients, (g, s, p)."""
-        return self.fit.unknowns[..., 1:]
+        return cast("Vectors", self.fit.influence)
 
     @property
     def ridge(self) -> Doubled:
@@ -262,7 +268,7 @@ class SecondRun:
             exact, _ = whole.second_run(self.alpha, self.here, self.ridge)
             assert exact is not None
             return exact
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
 
         result = Vectors.of(np.full(solved.corrections.shape, complex(np.nan, np.nan)))
         ceiling = None if objective.max_residual is None or objective.minimax else objective.max_residual
@@ -288,24 +294,18 @@ class SecondRun:
                 )
         return result
 
-    def deviations(self, corrections: Vectors) -> tuple[Doubled, Doubled]:
+    def deviations(self, corrections: Vectors) -> tuple[DoubledArray, DoubledArray]:
         """Return the deviations of size and angle (degrees) of the corrections, (g, p), to first order."""
-        from balancing.log_again import correction_deviations
-        from balancing.second_run import chosen
-        from dalembert.arithmetic.doubled import PI
+        from dalembert.arithmetic.doubled_arrays import DoubledArray
 
-        solved, group, request = self.solved, self.group, self.balancing.request
-        along, across = correction_deviations(
-            self.fit,
-            self.initial,
-            corrections + self.standing if solved.start.any() else corrections,
-            corrections,
-            exact_errors(group, request, self.fit),
-            group.weights,
-            self.ridge,
-        )
-        size = corrections.size
-        return along, across / chosen(size.high > 0, size, np.nan) * 180.0 / PI
+        solved, group = self.solved, self.group
+        whole = corrections + self.standing if solved.start.any() else corrections
+        weights = None if group.weights is None else in_32_digits(group.weights)
+        errors = exact_errors(group, self.balancing.request, self.raw)
+        numbers: Any = self.fit, whole, errors, weights, corrections, DoubledArray.of(self.ridge)
+        along, across = LogBalance(*numbers).deviations
+        size = np.abs(cast("Any", corrections))
+        return along, across / np.where(size > 0, size, np.nan) * 180.0 / np.pi  # type: ignore[return-value]
 
 
 def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> list[Real]:
@@ -315,7 +315,7 @@ def digits(balancing: FieldBalancing, solved: Solved, warnings: list[str]) -> li
     run = SecondRun(balancing, solved)
     corrections = run.corrections(warnings)
     trim = corrections if solved.start.any() else corrections - run.standing
-    deviations = (Doubled(np.full(solved.corrections.shape, np.nan)),) * 2
+    deviations: Any = (Doubled(np.full(solved.corrections.shape, np.nan)),) * 2
     if solved.drawn:
         sentence = "--digits: the uncertainties from drawn readings are printed in full: their rounding error is not known"
         warnings += [sentence] if sentence not in warnings else []

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from balancing.second_run import ExactParts
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,7 +56,7 @@ class Positions:
         size, angle = numbers[self.quantity], numbers["angle" if self.quantity == "unbalance" else "phase"]
         sizes = size.exact if self.quantity == "unbalance" else size.decimals
         read = vectors(sizes, angle)
-        return ExactParts(read.conj if self.phase_lag else read, turns(numbers["turned"]))
+        return ExactParts(read.conj() if self.phase_lag else read, turns(numbers["turned"]))
 
     def shown(self, value: Scaled) -> Scaled:
         """Return a value in the unit of the file."""

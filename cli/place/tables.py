@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
 
 METHOD = (
@@ -170,7 +170,7 @@ class SecondRun:
     @cached_property
     def target(self) -> Vectors:
         """The sum of the corrections."""
-        from dalembert.arithmetic.doubled_vectors import Vectors
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.tables.exact import vectors
         from dalembert.tables.table import Numbers
 
@@ -213,7 +213,7 @@ class SecondRun:
 
     def _made(self, of_share: tuple[Doubled, Doubled], placed: Placed) -> Made:
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import part
+        from dalembert.arithmetic.doubled_operations import part
 
         masses, angles = of_share
         mass, depth, drill = part(masses, placed.place), Doubled(0.0), self.request.drill
@@ -223,8 +223,9 @@ class SecondRun:
 
     def _placed(self, share: Share, goal: Vectors) -> tuple[Doubled, Doubled]:
         """Return the masses of a plane and their angles in degrees, (n,) each."""
-        from dalembert.arithmetic.doubled import PI, Doubled
-        from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+        from dalembert.arithmetic.doubled import PI
+        from dalembert.arithmetic.doubled_arrays import DoubledArray
+        from dalembert.arithmetic.doubled_operations import doubled_array
         from dalembert.tables.exact import writtens
 
         request = self.request
@@ -235,7 +236,8 @@ class SecondRun:
             return goal.size * np.ones(1), goal[None].degrees
         places = request.exact_places()
         angles = doubled_array([place % 360 for place in places], (len(places),))
-        arms = Vectors.polar(Doubled(np.ones(len(places))), places, "deg", (len(places),))
+        around: Any = DoubledArray.of(angles)
+        arms: Any = phasor(np.ones(len(places)), around, "deg")
         masses = writtens(share.placed.masses)
         if request.stock is None:
             masses = share.placed.second_run(goal, arms, masses)
@@ -267,7 +269,7 @@ def _joined(numbers: Iterable[Doubled]) -> Doubled:
 
 def _one_after_another(vectors: Iterable[Vectors]) -> Vectors:
     """Vectors as one row."""
-    from dalembert.arithmetic.doubled_vectors import Vectors
+    from dalembert.arithmetic.doubled_arrays import Vectors
 
     return Vectors.joined([vector[None] for vector in vectors])
 

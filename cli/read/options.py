@@ -306,7 +306,7 @@ class Steps(NamedTuple):
         from fractions import Fraction
 
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_vectors import doubled_array
+        from dalembert.arithmetic.doubled_operations import doubled_array
 
         if self._fits:
             return Doubled((self.first + i * self.each).astype(float)) / float(self.below)

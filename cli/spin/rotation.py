@@ -52,7 +52,7 @@ class Written(NamedTuple):
     def exact(self) -> Any:
         """The numbers in 32 digits, with the decimals of the file exact."""
         from dalembert.arithmetic.doubled_arrays import DoubledArray
-        from dalembert.arithmetic.doubled_vectors import doubled_array
+        from dalembert.arithmetic.doubled_operations import doubled_array
 
         parts = [decimals(text, self.dimension) for text in self.texts]
         exact = [exactly(*each) for each in parts if each is not None]

@@ -166,13 +166,13 @@ class WorkBalance:
     @cached_property
     def second(self) -> list[tuple[LinkStates, Again]]:
         """The states of each group and what balances them in 32 digits, of the decimals of the table as they are written."""
-        from dalembert.arithmetic.doubled_arrays import DoubledComplex
+        from dalembert.arithmetic.doubled_arrays import Vectors
         from dalembert.tables.exact import plain
 
         groups = []
         for (members, rows), (_, solved) in zip(self.places, self.groups, strict=True):
             states = self._link_states(self.states.exact, rows)
-            gravity: Any = DoubledComplex(plain(self.gravity.real), plain(self.gravity.imag))
+            gravity: Any = Vectors.of_parts(plain(self.gravity.real), plain(self.gravity.imag))
             states = replace(states, gravity=gravity)
             loads = (map(plain, of) for of in self.states.unit_loads(members, rows))
             unknowns = [UnitLoad(_vector(x, y), torque) for x, y, torque in loads]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 from dalembert.arithmetic.doubled_arrays import DoubledArray
-from dalembert.arithmetic.doubled_vectors import doubled_array
+from dalembert.arithmetic.doubled_operations import doubled_array
 
 
 def exactly(numbers: Iterable[Fraction], shape: tuple[int, ...]) -> DoubledArray:

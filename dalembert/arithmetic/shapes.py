@@ -23,7 +23,7 @@ def as_array(x: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(x, dtype=float)
 
 
-def as_vectors(x: ArrayLike) -> NDArray[np.complex128]:
+def as_vectors(x: Any) -> NDArray[np.complex128]:
     """Return an array of complex numbers x + iy; one of 32 digits stays as it is."""
     if is_doubled(x):
         doubled: NDArray[np.complex128] = x
@@ -32,12 +32,17 @@ def as_vectors(x: ArrayLike) -> NDArray[np.complex128]:
 
 
 def in_32_digits(x: ArrayLike) -> Any:
-    """Return the same numbers as a `DoubledArray`; complex ones as a `DoubledComplex`."""
-    from dalembert.arithmetic.doubled_arrays import DoubledArray, DoubledComplex
+    """Return the same numbers as a `DoubledArray`; complex ones as a `Vectors`."""
+    from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 
     if is_doubled(x):
         return x
-    return DoubledComplex.of(x) if np.iscomplexobj(x) else DoubledArray(x)
+    return Vectors.of(x) if np.iscomplexobj(x) else DoubledArray(x)
+
+
+def floats(x: Any) -> Any:
+    """Return the floats nearest to numbers: what decides is taken from them in the second run too."""
+    return x.value if is_doubled(x) else x
 
 
 def filled(shape: Shape, value: float, like: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -160,7 +160,7 @@ def apart(
     def errors() -> NDArray[np.float64]:
         import numpy as np
 
-        from dalembert.arithmetic.doubled_vectors import off
+        from dalembert.arithmetic.doubled_operations import off
 
         second = exact()
         if unit != document_unit(dimension):

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from math import pi, ulp
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dalembert.angles import phasor
 from dalembert.arithmetic.doubled import PI, Doubled
-from dalembert.arithmetic.doubled_arrays import DoubledArray
-from dalembert.arithmetic.doubled_vectors import Vectors, doubled_array
+from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
+from dalembert.arithmetic.doubled_operations import doubled_array
 from dalembert.quantities import exactly, option_digits
 from dalembert.tables.table import Numbers
 from dalembert.units import UNITS
@@ -52,8 +54,10 @@ def turns(angle: Numbers) -> Vectors:
 
 def vectors(sizes: Iterable[Fraction], angle: Numbers) -> Vectors:
     """Vectors of exact sizes at the angles of a column, (n,)."""
-    exact: Sequence[Fraction] = angle.exact
-    return Vectors.polar(doubled_array(sizes, (len(exact),)), exact, angle.unit, (len(exact),))
+    shape = (len(angle.values),)
+    size, turned = (DoubledArray.of(doubled_array(x, shape)) for x in (sizes, angle.exact))
+    polar: Callable[..., Any] = phasor
+    return cast("Vectors", polar(size, turned, "deg" if angle.unit == "deg" else "rad"))
 
 
 def array(numbers: ArrayLike) -> DoubledArray:

@@ -26,7 +26,7 @@ from balancing import (
 from benchmarks.stress.campaigns import replay
 from benchmarks.stress.rotors import CAMPAIGNS as ROTORS
 from benchmarks.stress.vibration import CAMPAIGNS as VIBRATION
-from dalembert.arithmetic.doubled_vectors import Vectors
+from dalembert.arithmetic.doubled_arrays import Vectors
 
 Complex = NDArray[np.complex128]
 

@@ -19,7 +19,7 @@ from balancing import (
     stored_prior,
 )
 from balancing.second_run import pseudo_inverse
-from dalembert.arithmetic.doubled_vectors import Vectors
+from dalembert.arithmetic.doubled_arrays import Vectors
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

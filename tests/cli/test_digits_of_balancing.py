@@ -268,7 +268,7 @@ def test_nothing_is_worked_out_without_the_option(tmp_path: Path) -> None:
     code = (
         "import sys\nfrom cli.app import main\nsys.argv = ['dalembert', 'field', 'runs.csv']\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        "print([m for m in ('balancing.log_again', 'balancing.rounding', 'balancing.optimality') if m in sys.modules])"
+        "print([m for m in ('balancing.rounding', 'balancing.optimality') if m in sys.modules])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=True
