@@ -10,15 +10,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
-from functools import cache, cached_property
-from importlib import import_module
+from functools import cached_property
 from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.description import Ask, Exercise, Solved, Value, value_of
 from cli.read.options import components
-from cli.show.output import result_of
+from cli.show.output import parser, result_of
 from dalembert.errors import DataError, quote
 from dalembert.quantities import is_number, unit_ratio
 from dalembert.tables.files import SUFFIXES, read_bytes, split_sheet
@@ -367,7 +366,7 @@ class Problem:
     def parameters(self) -> Mapping[str, Any]:
         """What the command's words say, by the names of its parameters."""
         name, *rest = self.command
-        values: Mapping[str, Any] = _parser(name).make_context(name, rest).params
+        values: Mapping[str, Any] = parser(name).make_context(name, rest).params
         return values
 
     @cached_property
@@ -411,12 +410,3 @@ class Problem:
             reason = f": {result.warnings[0]}" if result.warnings else ""
             raise DataError(f"{self.exercise.file}: key command: no case of it can be solved{reason}")
         return Solved(self.exercise, tables, document, result)
-
-
-@cache
-def _parser(name: str) -> Any:
-    import typer
-
-    app = typer.Typer(add_completion=False)
-    app.command(name)(import_module(f"cli.{name}").run)
-    return typer.main.get_command(app)

@@ -381,20 +381,17 @@ def _taking() -> Iterator[list[Result]]:
 
 
 @cache
-def _runner(name: str) -> Callable[[Sequence[str]], Any]:
-    """Return what runs a command on the words behind its name."""
+def parser(name: str) -> Any:
+    """Return what parses the words behind a command's name, and runs it."""
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     app.command(name)(import_module(f"cli.{name}").run)
-    built = typer.main.get_command(app)
-    return lambda words: built.main(list(words), prog_name="dalembert", standalone_mode=False)
+    return typer.main.get_command(app)
 
 
 @cache
 def options_of(name: str) -> frozenset[str]:
     """Return the options that a command takes."""
-    app = typer.Typer(add_completion=False)
-    app.command(name)(import_module(f"cli.{name}").run)
-    return frozenset(flag for parameter in typer.main.get_command(app).params for flag in parameter.opts)
+    return frozenset(flag for parameter in parser(name).params for flag in parameter.opts)
 
 
 def result_of(words: Sequence[str]) -> Result:
@@ -408,7 +405,7 @@ def result_of(words: Sequence[str]) -> Result:
     name, *rest = words
     with _taking() as taken:
         try:
-            _runner(name)([*rest, "--text", "--json"])
+            parser(name).main([*rest, "--text", "--json"], prog_name="dalembert", standalone_mode=False)
         except DataError:
             raise
         except Exception as error:
