@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from dataclasses import fields
 from typing import Any
 
@@ -277,3 +278,44 @@ def test_a_torsion_spring_counts_the_whole_turns_of_its_input(angle: int) -> Non
     steps = np.linspace(-1, 1, 5)
     ours, theirs = m.motion(angle + steps).effort, back.motion(angle + steps).effort
     assert theirs == pytest.approx(ours, rel=1e-12)
+
+
+GEARED = """
+[ground]
+A = [0, 0]
+D = [1, 0]
+W = [2, 0]
+[links.crank]
+points = { A = [0, 0], B = [0.4, 0] }
+[links.coupler]
+points = { B = [0, 0], C = [1.1, 0] }
+[links.rocker]
+points = { D = [0, 0], C = [0.8, 0] }
+[links.wheel]
+points = { W = [0, 0] }
+[[gears]]
+links = ["rocker", "wheel"]
+ratio = 300
+[[torsion_springs]]
+links = ["ground", "wheel"]
+stiffness = 2
+[input]
+link = "crank"
+angle = "300 deg"
+[guess]
+at = "60 deg"
+coupler = "20 deg"
+rocker = "90 deg"
+"""
+
+
+@pytest.mark.parametrize("ratio", [3, 0.1, -3, 300, -1000])
+def test_a_torsion_spring_behind_a_fast_gear_is_wound_by_all_its_turns(ratio: float) -> None:
+    """By the rocker's own turn from the guess, in steps of a thousandth of a degree."""
+    m = Mechanism.from_toml_text(GEARED.replace("ratio = 300", f"ratio = {ratio}"))
+    written = ET.fromstring(file_bytes(m, home(m), ".xml", "file.toml", {})[0])
+    (tendon,) = (e for e in written.iter("fixed") if e.get("springlength"))
+    rocker = m.motion(np.radians(np.linspace(60, 300, 240_001))).link("rocker").angle
+    wound = ratio * (np.unwrap(rocker)[-1] - rocker[0])
+    # the coordinate of the tree is 0 in the start pose
+    assert float(tendon.get("springlength", "")) == pytest.approx(-wound, rel=1e-12)
