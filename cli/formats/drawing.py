@@ -121,8 +121,7 @@ class Travel:
         """The greatest effort of the input over a whole period, N·m or N; None where it is limited or nothing acts."""
         if self.motion is None or self.m.check.input_limits is not None:
             return None
-        effort = np.abs(self.motion.effort)
-        peak = float(effort.max())
+        peak = self.motion.cycle.peak
         return peak if math.isfinite(peak) and peak > 0 else None
 
 

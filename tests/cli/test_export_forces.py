@@ -13,7 +13,7 @@ from cli.formats.export_command import file_bytes
 from tests.cli.exported import MASSIVE, exported, home, moved
 from tests.cli.imported import only
 from tests.conftest import Dalembert
-from virtualwork import Mechanism
+from virtualwork import Input, Link, Mechanism
 
 ROBOTS = (".xml", ".urdf", ".sdf")
 # a bar slides on a rocker as the wheel on the rocker turns; its tip runs in a slot of the ground
@@ -319,3 +319,17 @@ def test_a_torsion_spring_behind_a_fast_gear_is_wound_by_all_its_turns(ratio: fl
     wound = ratio * (np.unwrap(rocker)[-1] - rocker[0])
     # the coordinate of the tree is 0 in the start pose
     assert float(tendon.get("springlength", "")) == pytest.approx(-wound, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_greatest_effort_is_that_between_the_samples_too(sign: int) -> None:
+    """Of a crank with a weight the effort is m·g·r·|sin|, at its largest for 90° and 270°."""
+    crank = Mechanism(
+        {"O": 0j},
+        {"crank": Link({"O": 0j}, mass=2.0, center=complex(0.3, 0.07))},
+        inputs=Input(link="crank", value=0.123, speed=5.0 * sign),
+        gravity=complex(0, -9.81),
+    )
+    written = ET.fromstring(file_bytes(crank, home(crank), ".xml", "file.toml", {})[0])
+    low, high = map(float, next(written.iter("motor")).get("ctrlrange", "").split())
+    assert (-low, high) == pytest.approx((2 * 9.81 * abs(complex(0.3, 0.07)),) * 2, rel=1e-14)
