@@ -165,32 +165,8 @@ def _same(ask: Ask, key: str, cell: str) -> bool:
     return cell == wanted or (is_number(number) and same(float(number), wanted))
 
 
-SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-SPELLED = (
-    (r"[Kk][Gg](?![a-zA-Z])", "kg"),
-    (r"sec\b", "s"),
-    (r"degrees?\b|º", "deg"),
-    (r"rad(s|ians?)\b", "rad"),
-    (r"RPM\b", "rpm"),
-    # N-m, and units that are run together: Nm, kgm², gmm
-    (r"(?<=[A-Za-z])-(?=[A-Za-z])", "*"),
-    (r"(?<![A-Za-z])([kMm]?N|kgf|kg|g)(mm|cm|m)(?![A-Za-z])", r"\1*\2"),
-)
-"""Spellings of units, and how they are read."""
 PREFIXES = {"k": 1000, "M": 10**6}
 """kJ, MW: a thousand or a million of a unit that is known."""
-INVERSE = re.compile(r"1/s(?:\^?2)?|s\^?-[12]")
-
-
-def spelled(unit: str, unit_of_question: str) -> str:
-    """Return a unit in the spelling that is read: `Nm` is `N*m`."""
-    unit = unit.translate(SUPERSCRIPTS).replace("²", "2")
-    for pattern, plain in SPELLED:
-        unit = re.sub(pattern, plain, unit)
-    # a radian is a number: ω in 1/s
-    if INVERSE.fullmatch(unit) and unit_of_question in ("rad_s", "rad_s2"):
-        return "rad/s2" if unit.endswith("2") else "rad/s"
-    return unit
 
 
 def scale_of(unit: str, unit_of_question: str) -> Fraction | None:
@@ -203,8 +179,10 @@ def scale_of(unit: str, unit_of_question: str) -> Fraction | None:
     """
     if unit == unit_of_question or not unit_of_question:
         return Fraction(1) if unit == unit_of_question or not unit else None
-    unit = spelled(unit, unit_of_question)
     scale = unit_ratio(unit, unit_of_question)
+    if scale is None and unit_of_question in ("rad_s", "rad_s2"):
+        # a radian is a number: ω in 1/s
+        scale = unit_ratio(f"rad*{unit}", unit_of_question)
     if scale is None and unit[:1] in PREFIXES:
         scale = unit_ratio(unit[1:], unit_of_question)
         return None if scale is None else scale * PREFIXES[unit[0]]
