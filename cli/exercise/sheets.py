@@ -11,13 +11,12 @@ from cli.exercise.description import Answer, Ask, Exercise, Value, unit_text
 from cli.exercise.solving import DataTable, Workshop, cell_of
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
-from cli.show.report import html_part, report
+from cli.show.report import html_part, report, spelled
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.text import csv_text
 from dalembert.units import parted
-from dalembert.units import written as unit_written
 
 STYLE = """
 :root { color-scheme: light }
@@ -157,11 +156,6 @@ def problem_html(variant: Variant, drawing: str) -> str:
 def table_html(table: DataTable) -> str:
     """Return a table of data."""
 
-    def head(title: str) -> str:
-        # a header with its unit behind a bracket or a comma stands as the file has it
-        name, unit = parted(title.strip(), further=("kg_m2", "kg_m2_s"))
-        return html.escape((f"{name} [{unit_written(unit)}]" if unit else title).replace("_", " "))
-
     def cell(text: str) -> str:
         number = re.fullmatch(r"\s*[-−]?[\d.,]+(?:[eE][-+]?\d+)?\s*", text) is not None
         return (
@@ -171,7 +165,7 @@ def table_html(table: DataTable) -> str:
         )
 
     rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in table.rows)
-    header = "".join(f"<th>{head(title)}</th>" for title in table.header)
+    header = "".join(f"<th>{html.escape(spelled(title.strip()))}</th>" for title in table.header)
     dense = ' class="dense"' if len(table.header) > 8 else ""
     return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
 
