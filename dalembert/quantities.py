@@ -63,6 +63,18 @@ def exactly(number: str, factor: Factor) -> Fraction:
     return Fraction(number) * exact(factor[0]) / exact(factor[1]) if float(number) else Fraction(0)
 
 
+def unit_ratio(unit: str, other: str) -> Fraction | None:
+    """One unit in another; None where they do not measure the same.
+
+    >>> unit_ratio("kN", "N"), float(unit_ratio("rpm", "rad_s")), unit_ratio("kg", "N_m")
+    (Fraction(1000, 1), 0.10471975511965978, None)
+    """
+    own, wanted = composed(unit), composed(other)
+    if own is None or wanted is None or own[1] != wanted[1]:
+        return None
+    return exactly("1", own[0]) / exactly("1", wanted[0])
+
+
 def exactly_in_degrees(angle: Fraction) -> Fraction:
     """An angle, rad, in degrees: exact where it is written in degrees or turns.
 

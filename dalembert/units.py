@@ -116,7 +116,6 @@ RESULTS: dict[str, str] = {
     "power": "W",
 }
 
-
 _ENERGY = ("J", "kJ")  # and no torque, whose exponents are the same
 
 
@@ -172,8 +171,8 @@ def _lowest(num: float, den: float) -> Factor:
     return num, den
 
 
-SIGNS = {"µ": "u", "μ": "u", "²": "2", "³": "3", MINUS: "-", "°": "deg", "º": "deg"}
-SIGNS |= dict.fromkeys("·⋅×", "*")
+SIGNS = {"µ": "u", "μ": "u", MINUS: "-", "°": "deg", "º": "deg", **dict.fromkeys("·⋅×", "*")}
+SIGNS |= dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-", strict=True))
 _PLAIN = str.maketrans(SIGNS)
 # revolutions a minute, as instruments of several languages print them
 PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
@@ -186,20 +185,21 @@ _IN_FULL = {
     "ft": "foot feet",
     "mil": "mils thou",
     "in_s": "ips",
-    "kg": "kilogram kilograms",
+    "kg": "kg kilogram kilograms",
     "g": "gram grams",
     "lb": "lbs pound pounds",
     "oz": "ounce ounces",
     "s": "sec second seconds",
     "deg": "degree degrees",
-    "rad": "radian radians",
+    "rad": "rads radian radians",
     "rev": "revolution revolutions",
+    "rpm": "rpm",
     "N": "newton newtons",
 }
-"""Units in full, as people write them in files and options."""
+"""Units in full and in capitals, as people write them in files and options."""
 ABBREVIATIONS = {word: unit for unit, words in _IN_FULL.items() for word in words.split()}
 # products without a sign between their words: Nm, kNm, gmm, kgm2; `gm` may be grams
-JOINED = r"(?!gm\b)([kMm]?N|k?g|mg|oz|lbf?)(mm|cm|m|in|ft)(s?)(?![A-Za-z])"
+JOINED = r"(?!gm\b)([kMm]?N|kgf?|g|mg|oz|lbf?)(mm|cm|m|in|ft)(s?)(?![A-Za-z])"
 
 
 def _spelled(text: str) -> str:

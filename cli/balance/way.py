@@ -332,7 +332,6 @@ def _modal(b: Balancing, rotor: int, rows: list[int], fix: ModalCorrection, i: i
             for axis, part in (("x", value.real), ("y", value.imag))
         ]
         topics.append(_plane_topic(b, row, name, complex(value), ["From the system:", *lines], scale))
-    topics.append(_check(conditions, signs, planes, at_planes, sums, made, scale, unit))
     return topics
 
 
@@ -356,36 +355,6 @@ def _system(
         for p, name in enumerate(planes)
     ]
     return Topic("system", [*text, Table(shown, ("condition",), "rows[]")], "The system")
-
-
-def _check(
-    conditions: list[str], signs: list[str], planes: list[str], at_planes: Any, sums: Any,
-    made: Any, scale: Scale, unit: str,
-) -> Topic:  # fmt: skip
-    """The modal sums with the corrections vanish."""
-    text = ["With the corrections s_k + Σ_p φ_k(z_p)·w_p, each component:"]
-    left = []
-    for sign, row, s in zip(signs, at_planes, sums, strict=True):
-        rest = complex(s + row @ made)
-        size = abs(s) + float(np.abs(row) @ np.abs(made))
-        rest = rest if abs(rest) > 1e-12 * size else 0j
-        left.append(rest)
-        for axis, of in (("x", np.real), ("y", np.imag)):
-            products = _products(scale, of(made), row)
-            text.append(
-                f"  {sign}_{axis}: {scale.of(float(of(s)))} + {products} = {scale.of(float(of(rest)))} {scale.name}"
-            )
-    table = Table(
-        [],
-        (),
-        "residual[]",
-        documented=[
-            names("condition", conditions),
-            number("x", "unbalance", [z.real for z in left], unit),
-            number("y", "unbalance", [z.imag for z in left], unit),
-        ],
-    )
-    return Topic("check", [*text, table], "Check: the modal sums with the corrections")
 
 
 def _products(scale: Scale, values: Any, row: Any) -> str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from dalembert.errors import DataError, quote, toml_text
 from dalembert.hints import nearest
-from dalembert.quantities import is_number
+from dalembert.quantities import is_number, number_and_unit, unit_ratio
 from dalembert.results.text import plain
 from dalembert.tables.files import read_toml
 from dalembert.units import composed, parted, unit_name, written
@@ -242,11 +242,11 @@ def value_of(text: str) -> Value | None:
     >>> str(value_of("55mm")), str(value_of("-0.50")), value_of("5 furlongs")
     ('55 mm', '-0.50', None)
     """
-    match = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", text)
-    if match is None or (match[2] and composed(match[2]) is None):
+    parts = number_and_unit(text)
+    if parts is None or (parts[1] and composed(parts[1]) is None):
         return None
-    number = Decimal(match[1])
-    return Value(number, match[2]) if -60 < number.adjusted() < 60 else None
+    number, unit = Decimal(parts[0]), parts[1]
+    return Value(number, unit) if -60 < number.adjusted() < 60 else None
 
 
 def _steps(place: _Place, where: str, text: str) -> list[Value]:
@@ -393,11 +393,10 @@ class Solved:
     def _scale(found: str, column: Column, unit: str) -> tuple[str, Fraction] | None:
         if not unit or unit_name(unit) == column.unit:
             return None
-        own, wanted = composed(column.unit), composed(unit)
-        if own is None or wanted is None or own[1] != wanted[1]:
+        scale = unit_ratio(column.unit, unit)
+        if scale is None:
             raise DataError(f"{found}, expected a unit of {column.header}")
-        (n, d), (wn, wd) = own[0], wanted[0]
-        return unit, Fraction(n) / Fraction(d) * Fraction(wd) / Fraction(wn)
+        return unit, scale
 
     def _row(self, place: str, ask: Ask, table: Table) -> int:
         cells = table.cells

@@ -16,20 +16,8 @@ from dalembert.page import Page
 if TYPE_CHECKING:
     from virtualwork import Mechanism
 
-WIDTH, EDGE = 430.0, 34.0
-"""Of a figure, in units of its own; the edge leaves room for names."""
-TALLEST = 380.0
-STROKES = {
-    "rail": 'stroke="#555" stroke-width="1.2"', "hatch": 'stroke="#888" stroke-width=".8"',
-    "frame": 'stroke="#444" stroke-width="1.2" fill="#eee"', "link": 'stroke="#1d4f91" stroke-width="3" fill="#1d4f9118"',
-    "wheel": 'stroke="#6a3d9a" stroke-width="1.2" stroke-dasharray="9 3"', "spoke": 'stroke="#6a3d9a" stroke-width="1.2"',
-    "slot": 'stroke="#1d4f91" stroke-width="1" fill="#fff"', "block": 'stroke="#1d4f91" stroke-width="1.6" fill="#dfe8f4"',
-    "cam": 'stroke="#1d4f91" stroke-width="1.6" fill="#1d4f9118"', "roller": 'stroke="#6a3d9a" stroke-width="1.2"',
-    "belt": 'stroke="#444" stroke-width="1.6"', "rack": 'stroke="#6a3d9a" stroke-width="1.4"',
-    "spring": 'stroke="#444" stroke-width="1"', "mass": 'stroke="#666" stroke-width="1"',
-    "pin": 'stroke="#000" stroke-width="1.2" fill="#fff"', "tip": 'stroke="#000" stroke-width="1.2" fill="#000"',
-}  # fmt: skip
-"""How a shape of each role is drawn; the roles are those of `virtualwork.drawing`."""
+WIDTH = 430.0
+"""Of a rotor's figure, in units of its own."""
 
 
 def figure(variant: Variant) -> str:
@@ -75,63 +63,24 @@ def _svg(height: float, parts: Sequence[str], label: str) -> str:
     )
 
 
-def _text(x: float, y: float, text: str, anchor: str = "middle", more: str = "") -> str:
+def _text(x: float, y: float, text: str, more: str = "") -> str:
     # a white rim keeps a name readable upon lines
     return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="#111" stroke="#fff" stroke-width="4" '
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#111" stroke="#fff" stroke-width="4" '
         f'paint-order="stroke" {more}>{html.escape(text)}</text>'
     )
 
 
 # --- mechanisms ---------------------------------------------------------------------------------------------------
 def mechanism(variant: Variant) -> str:
-    """Draw the mechanism of a variant in the pose asked for, to scale."""
+    """Draw the mechanism of a variant in the pose asked for, to scale, as a notebook shows it."""
     import numpy as np
 
-    from virtualwork.drawing import Circle, standing
-    from virtualwork.formulas.poses import Poses
-    from virtualwork.picture.paper import shapes_of
+    from virtualwork.notebook_picture import svg
 
     m = _varied(variant)
     motion = m.motion(np.array([_inputs(variant, m)]))
-    poses: Poses = motion.poses
-    drawing = shapes_of(poses)
-    places = {body: [complex(poses.point(body, z)[0]) for z in (0j, 1 + 0j)] for body in m.bodies}
-
-    def at(body: str, z: complex) -> complex:
-        origin, unit = places[body]
-        return origin + z * (unit - origin)
-
-    shapes = [standing(shape, at) for shape in drawing.shapes]
-    reach = np.array([z for shape in shapes for z in shape.reach])
-    reach = reach[np.isfinite(reach)]
-    low, high = complex(reach.real.min(), reach.imag.min()), complex(reach.real.max(), reach.imag.max())
-    across, up = max(high.real - low.real, 1e-12), max(high.imag - low.imag, 1e-12)
-    scale = min((WIDTH - 2 * EDGE) / across, (TALLEST - 2 * EDGE) / up)
-    height = up * scale + 2 * EDGE
-    left = (WIDTH - across * scale) / 2
-
-    def xy(z: complex) -> tuple[float, float]:
-        return left + (z.real - low.real) * scale, height - EDGE - (z.imag - low.imag) * scale
-
-    parts = []
-    for shape in shapes:
-        look = STROKES[shape.role]
-        if isinstance(shape, Circle):
-            x, y = xy(shape.centre)
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{max(shape.radius * scale, 2):.1f}" {look}/>')
-            continue
-        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(xy, shape.points))
-        tag = "polygon" if shape.closed else "polyline"
-        parts.append(f'<{tag} points="{points}" {look if shape.closed else look.split(" fill")[0]}/>')
-    labels = [(each, *xy(at(each.body, each.at))) for each in drawing.labels]
-    pins: list[Box] = [(x, y, 5.0, 5.0) for each, x, y in labels if each.of == "point"]
-    # names of links give way to those of points
-    labels.sort(key=lambda label: label[0].of == "link")
-    italic = 'font-style="italic"'
-    names = [(each.text, x, y, "" if each.of == "point" else italic) for each, x, y in labels]
-    parts += _names(names, pins, height)
-    return _svg(height, parts, f"{m.name or 'mechanism'} in the pose of the exercise")
+    return svg(motion.poses, motion.drawing) or ""
 
 
 WAYS = [(9, -9), (-9, -9), (9, 19), (-9, 19), (14, 5), (-14, 5), (0, -14), (0, 26), (22, -20), (-22, -20)]

@@ -11,7 +11,7 @@ from math import lcm
 from uuid import NAMESPACE_URL, uuid5
 
 from cli.exercise.description import Exercise, unit_text
-from cli.exercise.sheets import Student, figures_text, label, problem_html
+from cli.exercise.sheets import Student, label, problem_html, question_text
 from cli.exercise.slips import Candidates
 from cli.exercise.variants import Variant
 from dalembert.figures import rounded
@@ -82,9 +82,7 @@ def _answer(fraction: int, value: Decimal, tolerance: Decimal, feedback: str) ->
 
 def question_html(variant: Variant, candidates: Candidates, drawing: str) -> str:
     """Return the text of a question: the problem, and what is asked."""
-    answer = candidates.answer
-    unit = unit_text(answer.unit)
-    question = f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {figures_text(answer.ask.figures)}"
+    question = question_text(candidates.answer)
     return f"{problem_html(variant, drawing)}<p><b>Find: {html.escape(question)}.</b></p>"
 
 
@@ -250,7 +248,7 @@ def weights(exercise: Exercise) -> list[int]:
 def _prairielearn_question(exercise: Exercise, variant: Variant) -> str:
     parts = ["<pl-question-panel>\n  {{{params.problem}}}\n</pl-question-panel>\n"]
     for k, (answer, weight) in enumerate(zip(variant.answers, weights(exercise), strict=True), 1):
-        caption = escaped(html.escape(f"{label(answer.ask)}, {figures_text(answer.ask.figures)}"))
+        caption = escaped(html.escape(question_text(answer, with_unit=False)))
         unit = html.escape(unit_text(answer.unit))
         suffix = f' suffix="{unit}"' if unit else ""
         parts.append(
@@ -337,8 +335,6 @@ def _part(own: Candidates) -> dict[str, object]:
     answer = own.answer
     marks = float(answer.ask.points)
     (value, half), *others = accepted(own)
-    unit = unit_text(answer.unit)
-    question = f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {figures_text(answer.ask.figures)}"
     alternatives = [
         {
             **_number(at - room, at + room, marks),
@@ -357,7 +353,7 @@ def _part(own: Candidates) -> dict[str, object]:
     ]
     return {
         **_number(value - half, value + half, marks),
-        "prompt": _content(f"<p>{html.escape(question)}</p>"),
+        "prompt": _content(f"<p>{html.escape(question_text(answer))}</p>"),
         "alternatives": alternatives,
     }
 

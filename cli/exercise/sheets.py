@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import csv
 import html
-import io
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cli.exercise.description import Answer, Ask, Exercise, Value, unit_text
 from cli.exercise.solving import DataTable, Workshop, cell_of
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
-from cli.show.report import html_part, report
+from cli.show.report import html_part, report, spelled
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
-from dalembert.results.columns import Table, names
+from dalembert.results.columns import Column, Table, names
+from dalembert.results.text import csv_text
 from dalembert.units import parted
-from dalembert.units import written as unit_written
 
 STYLE = """
 :root { color-scheme: light }
@@ -30,7 +28,7 @@ h3 { font-size: 11pt; margin: 4mm 0 1mm; break-after: avoid }
 p { margin: 2mm 0 } table { border-collapse: collapse; margin: 2mm 0; font-size: 10pt; max-width: 100% }
 th, td { padding: 1mm 1.6mm; border: .2mm solid #bbb; text-align: left; vertical-align: top; overflow-wrap: normal } th { background: #eee }
 .n { text-align: right; font-variant-numeric: tabular-nums } tr { break-inside: avoid } .wide { overflow-x: auto }
-.dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; width: 100%; max-width: 132mm; height: auto; margin: 0 auto }
+.dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { max-width: 132mm; margin: 4mm auto; break-inside: avoid } figure svg, figure img { display: block; max-width: 100%; height: auto; margin: 0 auto } figure svg:not([width]), figure img { width: 100% }
 .blank { width: 40mm; min-width: 20mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 details.page summary { min-height: 32px; line-height: 32px; cursor: pointer } @media print { details.page { display: none } }
 section + section { break-before: page }
@@ -131,9 +129,11 @@ def _key_text(key: str, text: str) -> str:
     return f"{name} {text}{'' if shown == '°' else ' '}{shown}".strip()
 
 
-def figures_text(figures: int) -> str:
-    """Return how many figures are asked for, in words."""
-    return "1 significant figure" if figures == 1 else f"{figures} significant figures"
+def question_text(answer: Answer, with_unit: bool = True) -> str:
+    """Return what a question asks for, in which unit, and to how many figures, in words."""
+    figures, unit = answer.ask.figures, unit_text(answer.unit) if with_unit else ""
+    count = "1 significant figure" if figures == 1 else f"{figures} significant figures"
+    return f"{label(answer.ask)}{f' in {unit}' if unit else ''}, {count}"
 
 
 def problem_html(variant: Variant, drawing: str) -> str:
@@ -156,11 +156,6 @@ def problem_html(variant: Variant, drawing: str) -> str:
 def table_html(table: DataTable) -> str:
     """Return a table of data."""
 
-    def head(title: str) -> str:
-        # a header with its unit behind a bracket or a comma stands as the file has it
-        name, unit = parted(title.strip(), further=("kg_m2", "kg_m2_s"))
-        return html.escape((f"{name} [{unit_written(unit)}]" if unit else title).replace("_", " "))
-
     def cell(text: str) -> str:
         number = re.fullmatch(r"\s*[-−]?[\d.,]+(?:[eE][-+]?\d+)?\s*", text) is not None
         return (
@@ -170,7 +165,7 @@ def table_html(table: DataTable) -> str:
         )
 
     rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in table.rows)
-    header = "".join(f"<th>{head(title)}</th>" for title in table.header)
+    header = "".join(f"<th>{html.escape(spelled(title.strip()))}</th>" for title in table.header)
     dense = ' class="dense"' if len(table.header) > 8 else ""
     return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
 
@@ -204,81 +199,41 @@ def sheet_page(
     return page(student.sheet, f"{exercise.title}: {student.name}", body)
 
 
-def table_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
-    """Return a CSV file."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return stream.getvalue().encode()
-
-
-def answers_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]) -> bytes:
-    """Return the table of answers to be filled in."""
-    others, keys = list(students[0].others), exercise.keys
-    header = ["student", *others, *keys.values(), "quantity", "unit", "answer"]
+def key_table(exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]) -> Table:
+    """The key: a row for each question and student, the answer rounded and whole, the student's numbers; `key.csv` has all of it."""
     rows = [
-        [student.name, *student.others.values(), *_question(answer, keys), ""]
+        (student, variant, answer)
         for student, variant in zip(students, variants, strict=True)
         for answer in variant.answers
     ]
-    return table_text(header, rows)
-
-
-def _question(answer: Answer, keys: Iterable[str]) -> list[str]:
-    return [*(answer.ask.where.get(key, "") for key in keys), answer.ask.quantity, answer.unit]
-
-
-def key_csv(exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]) -> bytes:
-    """Return the key: the right answers rounded and whole, and the numbers of each student."""
-    others, keys = list(students[0].others), exercise.keys
-    drawn = [draw.name for draw in exercise.draws]
-    header = [
-        "student",
-        *others,
-        *keys.values(),
-        "quantity",
-        "unit",
-        "answer",
-        "value",
-        "figures",
-        "points",
-        *drawn,
-    ]
-    rows = [
-        [
-            student.name, *student.others.values(), *_question(answer, keys), written(answer.value, answer.ask.figures),
-            repr(answer.value), str(answer.ask.figures), f"{float(answer.ask.points):g}",
-            *(str(variant.drawn[name]) for name in drawn),
-        ]
-        for student, variant in zip(students, variants, strict=True)
-        for answer in variant.answers
-    ]  # fmt: skip
-    return table_text(header, rows)
-
-
-def tables(
-    exercise: Exercise, students: Sequence[Student], variants: Sequence[Variant]
-) -> dict[str, Callable[[], Table]]:
-    """The tables of the result."""
-    rows = [
-        (student, answer)
-        for student, variant in zip(students, variants, strict=True)
-        for answer in variant.answers
-    ]
-    keys = exercise.keys
+    answers, keys = [answer for _, _, answer in rows], exercise.keys
+    points = [float(answer.ask.points) for answer in answers]
     columns = [
-        names("student", [student.name for student, _ in rows]),
-        *(names(header, [answer.ask.where.get(key) for _, answer in rows]) for key, header in keys.items()),
-        names("quantity", [answer.ask.quantity for _, answer in rows]),
-        names("unit", [answer.unit for _, answer in rows]),
-        names("answer", [written(answer.value, answer.ask.figures) for _, answer in rows]),
-        names("value", [answer.value for _, answer in rows]),
-        names("figures", [answer.ask.figures for _, answer in rows]),
-        names("points", [float(answer.ask.points) for _, answer in rows]),
+        names("student", [student.name for student, _, _ in rows]),
+        *(
+            Column(other, "", [student.others[other] for student, _, _ in rows])
+            for other in students[0].others
+        ),
+        *(names(header, [answer.ask.where.get(key) for answer in answers]) for key, header in keys.items()),
+        names("quantity", [answer.ask.quantity for answer in answers]),
+        names("unit", [answer.unit for answer in answers]),
+        names("answer", [written(answer.value, answer.ask.figures) for answer in answers]),
+        names("value", [answer.value for answer in answers]),
+        names("figures", [answer.ask.figures for answer in answers]),
+        names("points", [int(each) if each.is_integer() else each for each in points]),
+        *(
+            Column(draw.name, "", [str(variant.drawn[draw.name]) for _, variant, _ in rows])
+            for draw in exercise.draws
+        ),
     ]
-    table = Table(columns, ["student", *keys.values(), "quantity"], "key[]")
-    return {"key": lambda: table}
+    return Table(columns, ["student", *keys.values(), "quantity"], "key[]")
+
+
+def answers_csv(key: Table) -> bytes:
+    """Return the table of answers to be filled in: the key as far as the answers, which are blank."""
+    columns = list(key.cells.items())
+    asked = dict(columns[: [header for header, _ in columns].index("answer")])
+    return csv_text({**asked, "answer": [""] * key.length}).encode()
 
 
 SOLUTION_STYLE = """

@@ -19,11 +19,11 @@ from cli.exercise.description import Ask, Exercise, Solved, Value, value_of
 from cli.read.options import components
 from cli.show.output import parser_of, result_of
 from dalembert.errors import DataError, quote
-from dalembert.quantities import is_number
+from dalembert.quantities import is_number, unit_ratio
 from dalembert.tables.files import SUFFIXES, read_bytes, split_sheet
 from dalembert.tables.headers import heading
 from dalembert.tables.sources import open_source
-from dalembert.units import composed, parted
+from dalembert.units import parted
 
 if TYPE_CHECKING:
     from cli.balance.rotors import Rotors
@@ -131,20 +131,18 @@ class DataTable:
 
 
 def converted(value: Value, unit: str) -> str | None:
-    """Return a drawn value as a cell in a column's unit, exactly; None where the units do not fit."""
+    """Return a drawn value as a cell in a column's unit, exactly where that is a decimal; None where the units do not fit."""
     if not value.unit:
         return f"{value.number:f}"
-    own, wanted = composed(value.unit), composed(unit) if unit else None
-    if own is None or wanted is None or own[1] != wanted[1]:
+    scale = unit_ratio(value.unit, unit) if unit else None
+    if scale is None:
         return None
-    if own[0] == wanted[0]:
+    if scale == 1:
         return f"{value.number:f}"
-    (n, d), (wn, wd) = own[0], wanted[0]
-    if isinstance(n, int) and isinstance(d, int) and isinstance(wn, int) and isinstance(wd, int):
-        number = Fraction(value.number) * Fraction(n, d) / Fraction(wn, wd)
-        exact = Decimal(number.numerator) / Decimal(number.denominator)
-        return f"{exact:f}"
-    return repr(float(value.number) * n / d * wd / wn)
+    number = Fraction(value.number) * scale
+    exact = Decimal(number.numerator) / Decimal(number.denominator)
+    # 7 deg in rev, or anything in rad, is no decimal
+    return f"{exact:f}" if Fraction(exact) == number else repr(float(number))
 
 
 @dataclass(eq=False, repr=False)

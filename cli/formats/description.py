@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def text(d: Drawing, source: str, every_point: bool = False) -> str:
     """Return the TOML text; `source` says where the mechanism is from, `every_point` puts all joints into the guess."""
     d = _named(d)
     origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
-    tree = document(_parts(d, origins, every_point), AsWritten())
+    tree = document(parts_of(d, origins, every_point), AsWritten())
     for drive, table in zip(d.drives, tree.get("input", []), strict=True):
         # a speed keeps the unit of the other program
         table |= {} if drive.speed is None else {"speed": drive.speed}
@@ -31,8 +32,8 @@ def text(d: Drawing, source: str, every_point: bool = False) -> str:
     return written(tree | {"source": source, "units": {"length": d.length, "angle": d.angle}})
 
 
-def _parts(d: Drawing, origins: dict[str, complex], every_point: bool) -> dict[str, object]:
-    """Return the parts of a description, their numbers in the units of the file."""
+def parts_of(d: Drawing, origins: Mapping[str, complex], every_point: bool = False) -> dict[str, Any]:
+    """Return the parts of a description, their numbers in the units of the file; `origins`: where the axes of bodies begin."""
     links = {name: body for name, body in d.bodies.items() if name != GROUND}
     guides = d.guides.values() if every_point else [d.guides[r.slider] for r in d.racks]
     pins = d.pins() if every_point else {}

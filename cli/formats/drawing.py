@@ -19,13 +19,12 @@ from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.results.text import csv_text
 from dalembert.units import UNITS, to_si
-from virtualwork import drawing
 from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Line, standing, tracers
 from virtualwork.formulas.profiles import FINE, ProfilePoint, profile
-from virtualwork.parts_of_motion import SlideMotion
+from virtualwork.picture.paper import travel_of
 from virtualwork.study.cams import check_cam
 
 if TYPE_CHECKING:
@@ -114,18 +113,15 @@ class Travel:
 
     def way(self, guide: int) -> tuple[float, float] | None:
         """The least and the largest position along a guide, m."""
-        if self.motion is None:
-            return None
-        result = SlideMotion(self.motion, guide).position
-        return (float(np.nanmin(result)), float(np.nanmax(result))) if np.isfinite(result).any() else None
+        low, high = (math.nan, math.nan) if self.motion is None else travel_of(self.motion.poses)[guide]
+        return (low, high) if math.isfinite(low) else None
 
     @cached_property
     def peak(self) -> float | None:
         """The greatest effort of the input over a whole period, N·m or N; None where it is limited or nothing acts."""
         if self.motion is None or self.m.check.input_limits is not None:
             return None
-        effort = np.abs(self.motion.effort)
-        peak = float(effort.max())
+        peak = self.motion.cycle.peak
         return peak if math.isfinite(peak) and peak > 0 else None
 
 
@@ -182,9 +178,10 @@ class Strokes:
 
 def draw(m: Mechanism, inputs: tuple[float, ...], travel: Travel, unit: str, metres: float) -> Strokes:
     """Return the drawing of a pose and of the curves over the travel; `metres` are one of the unit."""
-    bodies = bodies_of(m, start_of(m, inputs))
-    ways = [travel.way(k) or (np.nan, np.nan) for k in range(len(m.guides))]
-    drawn = drawing.draw(m, ways)
+    start = start_of(m, inputs)
+    bodies = bodies_of(m, start)
+    # guides are as long as they are used
+    drawn = (travel.motion or start).drawing
 
     def world(body: str, z: complex) -> complex:
         return bodies[body].world(z)

@@ -20,29 +20,12 @@ LOADS: dict[str, tuple[str, tuple[tuple[str, str | None], ...], tuple[str, ...]]
     "ExternalForce": ("forces", (("body_id", "local_point"),), ()),
     "ExternalTorque": ("torques", (("body_id", None),), ("torque",)),
 }
-# keys of a document and of a body that are read, or that say nothing of a mechanism
+# keys that are read, or that say nothing of a mechanism
 READ = {
-    "bodies",
-    "joints",
-    "drivers",
-    "linear_drivers",
-    "forces",
-    "load_cases",
-    "sweep_config",
-    "mounting_angle",
+    "document": "bodies joints drivers linear_drivers forces load_cases sweep_config mounting_angle "
+    "schema_version name note notes meta source description",
+    "body": "attachment_points coupler_points mount_points point_masses mass cg_local izz_cg Izz_cg name note color render",
 }
-READ |= {"schema_version", "name", "note", "notes", "meta", "source", "description"}
-OF_BODY = {
-    "attachment_points",
-    "coupler_points",
-    "mount_points",
-    "point_masses",
-    "mass",
-    "cg_local",
-    "izz_cg",
-    "Izz_cg",
-}
-OF_BODY |= {"name", "note", "color", "render"}
 
 
 def read(file: str, data: Any) -> list[Drawing]:
@@ -126,7 +109,7 @@ class _Reader:
         for key in ("load_cases", "sweep_config"):
             if data.get(key):
                 d.leave(key, "drivers are the inputs; a range is an option of the command")
-        for key in sorted(data.keys() - READ):
+        for key in sorted(data.keys() - set(READ["document"].split())):
             d.leave(key, "it is not read")
         if data.get("mounting_angle"):
             d.leave("mounting_angle", "it turns gravity: turn `gravity` in the file instead")
@@ -137,7 +120,7 @@ class _Reader:
         held = self.get(where, e, "attachment_points")
         if not isinstance(held, dict):
             raise damaged(self.file, where, held, "attachment_points by name")
-        for key in sorted(e.keys() - OF_BODY):
+        for key in sorted(e.keys() - set(READ["body"].split())):
             self.d.leave(f"{where}, {key}", "it is not read")
         self.points[name] = {p: self.pair(f"{where}, point {p}", z) for p, z in held.items()}
         mass = self.real(f"{where}, mass", e.get("mass", 0.0))

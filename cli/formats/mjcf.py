@@ -276,13 +276,13 @@ def _springs(s: Skeleton, tendon: Element, bodies: dict[str, Element]) -> None:
             site = f"spring {k} {side}"
             xml.add(bodies[body], "site", name=site, pos=xml.spatial(m.place(body, point)))
             xml.add(made, "site", site=site)
-    for k, turning in enumerate(m.torsion_springs, 1):
+    for k, turning in enumerate(m.torsion_springs):
         on, link = turning.links
         terms = s.terms({link: 1.0, on: -1.0})
-        made = _fixed(tendon, f"torsion spring {k}", terms)
+        made = _fixed(tendon, f"torsion spring {k + 1}", terms)
         made.attrib |= {"stiffness": xml.digits(turning.stiffness), "damping": xml.digits(turning.damping)}
         here = sum(c * next(j.value for j in s.joints if j.name == name) for name, c in terms.items())
-        made.set("springlength", xml.digits(here - s.twist(turning)))
+        made.set("springlength", xml.digits(here - float(s.start.poses.twist(k)[0])))
 
 
 def _body(s: Skeleton, b: Branching, inside: Element) -> Element:

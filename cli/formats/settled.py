@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cli.formats.description import parts_of
 from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, together
-from cli.formats.values import apart
-from virtualwork.describe.parts import Guide
+from cli.formats.values import ORIGIN, apart
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.description import Description
+from virtualwork.formulas.constraints import Constraints
 
-Rows = NDArray[np.float64]
 # below this share a row of speeds follows from others: a file's decimals are fewer than ours
 FOLLOWS = 1e-6
 # of two coordinates: how far the difference of their floats may be from their own
@@ -183,77 +183,25 @@ def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
 
 
 # --- inputs ------------------------------------------------------------------------------------------------------
-class _Speeds:
-    """The linear equations of the bodies' speeds: three columns (vx, vy, ω) for each body; lengths are shares of the drawing's size."""
-
-    def __init__(self, d: Drawing) -> None:
-        self.d = d
-        self.size = d.size() or 1.0
-        self.columns = {name: 3 * k for k, name in enumerate(d.bodies)}
-
-    def at(self, body: str, z: complex) -> complex:
-        """Return where a place of a body stands, a share of the size."""
-        return self.d.bodies[body].world(z) / self.size
-
-    def moves(self, body: str, at: complex) -> Rows:
-        """Return the velocity of a point of a body, (2, columns)."""
-        rows = np.zeros((2, 3 * len(self.columns)))
-        k = self.columns[body]
-        rows[:, k : k + 2] = np.eye(2)
-        rows[:, k + 2] = -at.imag, at.real
-        return rows
-
-    def turns(self, body: str) -> Rows:
-        """Return the angular velocity of a body, (columns,)."""
-        row = np.zeros(3 * len(self.columns))
-        row[self.columns[body] + 2] = 1.0
-        return row
-
-    def along(self, s: Guide, turned: float) -> Rows:
-        """Return the velocity of a slide's point against its guide, along the line turned by `turned`."""
-        way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
-        at = self.at(s.link, self.d.bodies[s.link].points[s.point])
-        relative = self.moves(s.link, at) - self.moves(s.on, at)
-        return np.asarray(np.array([way.real, way.imag]) @ relative)
-
-    def joints(self) -> Rows:
-        """Return the sums that the ground, pins, slides, gears and racks keep at zero."""
-        d = self.d
-        rows = [np.eye(3, 3 * len(self.columns))]
-        for point, (first, *others) in d.pins().items():
-            at = self.at(first, d.bodies[first].points[point])
-            rows += [self.moves(first, at) - self.moves(other, at) for other in others]
-        for s in d.guides.values():
-            rows.append(self.along(s, np.pi / 2)[None])
-            if s.turned is not None:
-                rows.append((self.turns(s.link) - self.turns(s.on))[None])
-        for g in d.gears:
-            a, b, arm = (self.turns(name) for name in (*g.links, g.arm))
-            rows.append((b - arm - g.ratio * (a - arm))[None])
-        for r in d.racks:
-            s = d.guides[r.slider]
-            turned = self.turns(r.gear) - self.turns(s.on)
-            rows.append((self.along(s, 0.0) - r.radius / self.size * turned)[None])
-        return np.concatenate(rows)
-
-    def driven(self, e: Drive) -> Rows:
-        """Return the speed that an input drives."""
-        if e.slider is not None:
-            return self.along(self.d.guides[e.slider], 0.0)
-        return self.turns(str(e.link)) - self.turns(e.on)
-
-
 def _fit_inputs(d: Drawing) -> None:
     """Remove inputs that depend on those before them, and add free joints as inputs until all is driven."""
-    speeds = _Speeds(d)
-    # many joints that say the same become as few rows as there are columns
-    _, s, vt = np.linalg.svd(np.linalg.qr(speeds.joints(), mode="r"))
-    free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
-    kept: list[Drive] = []
     spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
     # where the file drives too many, those at the ground stay
-    for e in (*sorted(d.drives, key=lambda e: GROUND not in d.pair(e)), *spare):
-        row = free @ speeds.driven(e)
+    every = [*sorted(d.drives, key=lambda e: GROUND not in d.pair(e)), *spare]
+    try:
+        m = Description(**parts_of(replace(d, drives=every), dict.fromkeys(d.bodies, ORIGIN)))
+    except DescriptionError:
+        # it is named when the description is read again
+        return
+    bodies = (d.bodies[name] for name in m.links)
+    pose = [(b.turn, b.at.real / m.size, b.at.imag / m.size) for b in bodies]
+    rows = Constraints.at(m, np.ravel(pose), {})
+    # many joints that say the same become as few rows as there are columns
+    _, s, vt = np.linalg.svd(np.linalg.qr(rows.jacobian, mode="r"))
+    free = vt[int(np.sum(s > FOLLOWS * s.max(initial=0.0))) :]
+    kept: list[Drive] = []
+    for e, speed in zip(every, rows.inputs, strict=True):
+        row = free @ speed
         if np.linalg.norm(row) > FOLLOWS:
             # what the input holds is free no more
             kept.append(e)

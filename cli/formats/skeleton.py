@@ -17,7 +17,7 @@ from cli.formats.drawn import Body, Groups, unused
 from cli.formats.robot import BLOCK, WORLD
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
-from virtualwork.describe.parts import GROUND, TorsionSpring
+from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 # half the thickness of a link's strokes, of the mechanism's size
 THICK = 0.008
-# poses between the guess and the start
-FOLLOWED = 181
 # a rate of nothing, for an input's of one
 STILL = 1e-9
 
@@ -248,22 +246,6 @@ class Skeleton:
             slide = next(j.name for j in self.joints if j.guide == mesh.guide)
             result[slide] = mesh.shares[mesh.guide]
         return result
-
-    def twist(self, spring: TorsionSpring) -> float:
-        """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there.
-
-        Where the inputs alone fix both angles they count with their whole turns.
-        """
-        angles = [self.m.assembly.plan.angles[body] for body in spring.links]
-        more = 2 * np.pi * spring.turns - spring.free_angle
-        if all(angle.by_inputs for angle in angles):
-            on, link = (a.const + sum(k * self.inputs[j] for j, k in a.inputs) for a in angles)
-            return float(link - on + more)
-        way = np.linspace(self.m.at, self.inputs, FOLLOWED)
-        motion = self.m.motion(way if len(self.inputs) > 1 else way[:, 0])
-        first, second = (motion.link(b).angle if b != GROUND else np.zeros(FOLLOWED) for b in spring.links)
-        wound = np.unwrap(second - first)
-        return float(wound[-1] + more - 2 * np.pi * np.round((wound[0] - spring.free_angle) / (2 * np.pi)))
 
     def driven(self, k: int) -> Joint | None:
         """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""

@@ -34,8 +34,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.variants import several, workshop
-    from cli.grade.answers import read_students
-    from cli.grade.marks import METHOD, mark_all, tables
+    from cli.grade.marks import METHOD, mark_all, read_students, tables
     from cli.show.result import Result
 
     with workshop(read_exercise(options.file)) as shop:

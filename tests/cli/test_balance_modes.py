@@ -118,12 +118,7 @@ def test_the_worked_solution_of_the_modes(dalembert: Dalembert, tmp_path: Path) 
         done = dalembert(*words, "--steps", "--json", stdin=ROTOR)
         made, _ = corrections(done)
         way = json.loads(done.stdout)["way"]
-        assert [t["topic"] for t in way] == [
-            "modal sums",
-            "system",
-            *(f"plane {p}" for p in "ABCDE"),
-            "check",
-        ]
+        assert [t["topic"] for t in way] == ["modal sums", "system", *(f"plane {p}" for p in "ABCDE")]
         sums = np.array([complex(s["x_kg_m"], s["y_kg_m"]) for s in way[0]["sums"]]) * 1e6
         at_planes = np.array([row["at_planes"] for row in way[1]["rows"]])
         assert at_planes.shape == (conditions, 5)
@@ -132,6 +127,5 @@ def test_the_worked_solution_of_the_modes(dalembert: Dalembert, tmp_path: Path) 
         for k in range(1, conditions - first + 1):
             expected = U @ shape(k, [400, 725])
             assert abs(sums[first + k - 1] - expected) < 1e-6 * abs(expected)
-        assert all(left["x_kg_m"] == left["y_kg_m"] == 0 for left in way[-1]["residual"])
-        unbalances = [complex(t["x_kg_m"], t["y_kg_m"]) * 1e6 for t in way[2:-1]]
+        unbalances = [complex(t["x_kg_m"], t["y_kg_m"]) * 1e6 for t in way[2:]]
         assert np.abs(np.array(unbalances) - made).max() < 1e-12 * np.abs(made).max()

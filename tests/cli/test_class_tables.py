@@ -116,7 +116,7 @@ def test_the_figure_of_a_motion_has_its_first_instant(dalembert: Dalembert, tmp_
     sheet = (tmp_path / "out" / "sheet-1.html").read_text()
     across = [
         [float(x) for x in pair.split(",")]
-        for line in re.findall('<polyline points="([^"]*)"[^>]*stroke="#1d4f91"', sheet)
+        for line in re.findall('<polyline points="([^"]*)"[^>]*stroke="#3b82f6"', sheet)
         for pair in line.split()
     ]
     assert max(y for _, y in across) - min(y for _, y in across) < 1

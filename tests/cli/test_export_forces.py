@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from dataclasses import fields
 from typing import Any
 
@@ -12,7 +13,7 @@ from cli.formats.export_command import file_bytes
 from tests.cli.exported import MASSIVE, exported, home, moved
 from tests.cli.imported import only
 from tests.conftest import Dalembert
-from virtualwork import Mechanism
+from virtualwork import Input, Link, Mechanism
 
 ROBOTS = (".xml", ".urdf", ".sdf")
 # a bar slides on a rocker as the wheel on the rocker turns; its tip runs in a slot of the ground
@@ -277,3 +278,58 @@ def test_a_torsion_spring_counts_the_whole_turns_of_its_input(angle: int) -> Non
     steps = np.linspace(-1, 1, 5)
     ours, theirs = m.motion(angle + steps).effort, back.motion(angle + steps).effort
     assert theirs == pytest.approx(ours, rel=1e-12)
+
+
+GEARED = """
+[ground]
+A = [0, 0]
+D = [1, 0]
+W = [2, 0]
+[links.crank]
+points = { A = [0, 0], B = [0.4, 0] }
+[links.coupler]
+points = { B = [0, 0], C = [1.1, 0] }
+[links.rocker]
+points = { D = [0, 0], C = [0.8, 0] }
+[links.wheel]
+points = { W = [0, 0] }
+[[gears]]
+links = ["rocker", "wheel"]
+ratio = 300
+[[torsion_springs]]
+links = ["ground", "wheel"]
+stiffness = 2
+[input]
+link = "crank"
+angle = "300 deg"
+[guess]
+at = "60 deg"
+coupler = "20 deg"
+rocker = "90 deg"
+"""
+
+
+@pytest.mark.parametrize("ratio", [3, 0.1, -3, 300, -1000])
+def test_a_torsion_spring_behind_a_fast_gear_is_wound_by_all_its_turns(ratio: float) -> None:
+    """By the rocker's own turn from the guess, in steps of a thousandth of a degree."""
+    m = Mechanism.from_toml_text(GEARED.replace("ratio = 300", f"ratio = {ratio}"))
+    written = ET.fromstring(file_bytes(m, home(m), ".xml", "file.toml", {})[0])
+    (tendon,) = (e for e in written.iter("fixed") if e.get("springlength"))
+    rocker = m.motion(np.radians(np.linspace(60, 300, 240_001))).link("rocker").angle
+    wound = ratio * (np.unwrap(rocker)[-1] - rocker[0])
+    # the coordinate of the tree is 0 in the start pose
+    assert float(tendon.get("springlength", "")) == pytest.approx(-wound, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_greatest_effort_is_that_between_the_samples_too(sign: int) -> None:
+    """Of a crank with a weight the effort is m·g·r·|sin|, at its largest for 90° and 270°."""
+    crank = Mechanism(
+        {"O": 0j},
+        {"crank": Link({"O": 0j}, mass=2.0, center=complex(0.3, 0.07))},
+        inputs=Input(link="crank", value=0.123, speed=5.0 * sign),
+        gravity=complex(0, -9.81),
+    )
+    written = ET.fromstring(file_bytes(crank, home(crank), ".xml", "file.toml", {})[0])
+    low, high = map(float, next(written.iter("motor")).get("ctrlrange", "").split())
+    assert (-low, high) == pytest.approx((2 * 9.81 * abs(complex(0.3, 0.07)),) * 2, rel=1e-14)
