@@ -334,12 +334,13 @@ window.dalembert = {
   get(name) {
     if (isName(name)) return wrong.has(name) ? NaN : present(name);
     const quantity = model.quantities[name];
-    return quantity ? machine.value(state, quantity, shown) : NaN;
+    return quantity ? machine.quantity(state, quantity)(shown) : NaN;
   },
   curve(name) {
     const quantity = model.quantities[name];
     const j = inputNames.indexOf(name);
-    return Array.from({ length: n }, (_, l) => (j >= 0 ? machine.sweep[j][l] : quantity ? machine.value(state, quantity, l) : NaN));
+    const at = j >= 0 ? (l) => machine.sweep[j][l] : quantity ? machine.quantity(state, quantity) : () => NaN;
+    return Array.from({ length: n }, (_, l) => at(l));
   },
   limits: () => machine.limits(numbers).map(([q]) => q),
   options,

@@ -198,7 +198,7 @@ function tool(text, act) {
 // a wrong entry leaves nothing to take away, as it leaves no answer
 function copied(text) {
   outbox.hidden = !text;
-  outbox.value = text;
+  if (outbox.value !== text) outbox.value = text;
   if (!text) return;
   outbox.select();
   const done = () => {

@@ -163,10 +163,16 @@ function plot(column) {
   let cursor, dot, px, py;
   let noise = 0;
   const quiet = (y) => (Math.abs(y) < noise ? 0 : y);
+  let width;
   const chart = {
+    // the width is read where the window has changed: it makes the browser lay out the whole page
+    lay() {
+      width = Math.max(200, host.clientWidth);
+      chart.draw();
+    },
     draw() {
       const k = Number(choice.value);
-      const [width, height] = [Math.max(200, host.clientWidth), 150];
+      const height = 150;
       svg.replaceChildren();
       sized(svg, width, height);
       put(svg, "title", {}, whole.columns[k].header);
@@ -213,7 +219,7 @@ function plot(column) {
       }
       cursor = put(svg, "line", { class: "cursor", y1: margin.top, y2: height - margin.bottom });
       dot = put(svg, "circle", { class: "dot", r: 4.5 });
-      this.at(shown);
+      chart.at(shown);
     },
     at(i) {
       const y = quiet(whole.columns[Number(choice.value)].values[i]);
@@ -245,7 +251,7 @@ function plot(column) {
     host.remove();
   });
   plots.push(chart);
-  chart.draw();
+  chart.lay();
 }
 
 // --- the beginning ------------------------------------------------------------------------------------------------------
@@ -256,7 +262,7 @@ function start(scene) {
   watchers.push((i) => plots.forEach((one) => one.at(i)));
   const lay = () => {
     scene.resize();
-    plots.forEach((one) => one.draw());
+    plots.forEach((one) => one.lay());
     show(shown);
   };
   lay();
