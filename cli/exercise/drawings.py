@@ -10,26 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.variants import Variant
+from dalembert.drawing.beside import along, around, beside
 from dalembert.errors import DataError
 from dalembert.page import Page
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism
 
-WIDTH, EDGE = 430.0, 34.0
-"""Of a figure, in units of its own; the edge leaves room for names."""
-TALLEST = 380.0
-STROKES = {
-    "rail": 'stroke="#555" stroke-width="1.2"', "hatch": 'stroke="#888" stroke-width=".8"',
-    "frame": 'stroke="#444" stroke-width="1.2" fill="#eee"', "link": 'stroke="#1d4f91" stroke-width="3" fill="#1d4f9118"',
-    "wheel": 'stroke="#6a3d9a" stroke-width="1.2" stroke-dasharray="9 3"', "spoke": 'stroke="#6a3d9a" stroke-width="1.2"',
-    "slot": 'stroke="#1d4f91" stroke-width="1" fill="#fff"', "block": 'stroke="#1d4f91" stroke-width="1.6" fill="#dfe8f4"',
-    "cam": 'stroke="#1d4f91" stroke-width="1.6" fill="#1d4f9118"', "roller": 'stroke="#6a3d9a" stroke-width="1.2"',
-    "belt": 'stroke="#444" stroke-width="1.6"', "rack": 'stroke="#6a3d9a" stroke-width="1.4"',
-    "spring": 'stroke="#444" stroke-width="1"', "mass": 'stroke="#666" stroke-width="1"',
-    "pin": 'stroke="#000" stroke-width="1.2" fill="#fff"', "tip": 'stroke="#000" stroke-width="1.2" fill="#000"',
-}  # fmt: skip
-"""How a shape of each role is drawn; the roles are those of `virtualwork.drawing`."""
+MOST = 500.0, 440.0
+"""Width and height of a mechanism's figure, pixels."""
+WIDTH, LETTERS = 430.0, 15.0
+"""Width of a rotor's figure, and the size of letters, pixels."""
 
 
 def figure(variant: Variant) -> str:
@@ -69,8 +60,8 @@ def _given(path: Any) -> str:
 
 def _svg(height: float, parts: Sequence[str], label: str) -> str:
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" '
-        f'aria-label="{html.escape(label)}" font-family="Arial, Liberation Sans, sans-serif" font-size="15" fill="none" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" width="{WIDTH:.0f}" height="{height:.0f}" '
+        f'role="img" aria-label="{html.escape(label)}" font-family="Arial, Liberation Sans, sans-serif" font-size="{LETTERS:g}" fill="none" '
         f'stroke-linejoin="round" stroke-linecap="round">{"".join(parts)}</svg>'
     )
 
@@ -88,75 +79,11 @@ def mechanism(variant: Variant) -> str:
     """Draw the mechanism of a variant in the pose asked for, to scale."""
     import numpy as np
 
-    from virtualwork.drawing import Circle, standing
-    from virtualwork.formulas.poses import Poses
-    from virtualwork.picture.paper import shapes_of
+    from virtualwork.notebook_picture import svg
 
     m = _varied(variant)
     motion = m.motion(np.array([_inputs(variant, m)]))
-    poses: Poses = motion.poses
-    drawing = shapes_of(poses)
-    places = {body: [complex(poses.point(body, z)[0]) for z in (0j, 1 + 0j)] for body in m.bodies}
-
-    def at(body: str, z: complex) -> complex:
-        origin, unit = places[body]
-        return origin + z * (unit - origin)
-
-    shapes = [standing(shape, at) for shape in drawing.shapes]
-    reach = np.array([z for shape in shapes for z in shape.reach])
-    reach = reach[np.isfinite(reach)]
-    low, high = complex(reach.real.min(), reach.imag.min()), complex(reach.real.max(), reach.imag.max())
-    across, up = max(high.real - low.real, 1e-12), max(high.imag - low.imag, 1e-12)
-    scale = min((WIDTH - 2 * EDGE) / across, (TALLEST - 2 * EDGE) / up)
-    height = up * scale + 2 * EDGE
-    left = (WIDTH - across * scale) / 2
-
-    def xy(z: complex) -> tuple[float, float]:
-        return left + (z.real - low.real) * scale, height - EDGE - (z.imag - low.imag) * scale
-
-    parts = []
-    for shape in shapes:
-        look = STROKES[shape.role]
-        if isinstance(shape, Circle):
-            x, y = xy(shape.centre)
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{max(shape.radius * scale, 2):.1f}" {look}/>')
-            continue
-        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(xy, shape.points))
-        tag = "polygon" if shape.closed else "polyline"
-        parts.append(f'<{tag} points="{points}" {look if shape.closed else look.split(" fill")[0]}/>')
-    labels = [(each, *xy(at(each.body, each.at))) for each in drawing.labels]
-    pins: list[Box] = [(x, y, 5.0, 5.0) for each, x, y in labels if each.of == "point"]
-    # names of links give way to those of points
-    labels.sort(key=lambda label: label[0].of == "link")
-    italic = 'font-style="italic"'
-    names = [(each.text, x, y, "" if each.of == "point" else italic) for each, x, y in labels]
-    parts += _names(names, pins, height)
-    return _svg(height, parts, f"{m.name or 'mechanism'} in the pose of the exercise")
-
-
-WAYS = [(9, -9), (-9, -9), (9, 19), (-9, 19), (14, 5), (-14, 5), (0, -14), (0, 26), (22, -20), (-22, -20)]
-"""Where a name may stand beside its place, the preferred way first."""
-Box = tuple[float, float, float, float]
-"""Middle, half the width, half the height."""
-
-
-def _names(names: Sequence[tuple[str, float, float, str]], taken: list[Box], height: float) -> Iterator[str]:
-    """The names (text, place, look), each where it meets none of the others and nothing that is taken, within the figure."""
-    for text, x, y, look in names:
-        half = 4.3 * len(text)
-        best, least = (x, y), float("inf")
-        for dx, dy in WAYS:
-            middle = x + dx + (half if dx > 0 else -half if dx < 0 else 0)
-            box = middle, y + dy - 5, half, 8.0
-            off = max(0.0, half - middle) + max(0.0, middle + half - WIDTH)
-            off += max(0.0, 8.0 - box[1]) + max(0.0, box[1] + 8.0 - height)
-            hits = sum(
-                abs(box[0] - t[0]) < box[2] + t[2] and abs(box[1] - t[1]) < box[3] + t[3] for t in taken
-            )
-            if hits + off < least:
-                best, least = (middle, y + dy), hits + off
-        taken.append((best[0], best[1] - 5, half, 8.0))
-        yield _text(*best, text, more=look)
+    return svg(motion.poses, motion.drawing, most=MOST, letters=LETTERS) or ""
 
 
 def _varied(variant: Variant) -> Mechanism:
@@ -212,24 +139,31 @@ def rotor(variant: Variant) -> str:
     ]
     far = float(radius.max()) or 1.0
     sizes = radius / far * r
-    axes: list[Box] = [(cx + r * 1.2 + 6, cy, 5.0, 8.0), (cx + 12, cy - r * 1.2, 5.0, 8.0)]
+    lines = [[(cx - r * 1.2, cy), (cx + r * 1.2 + 12, cy)], [(cx, cy - r * 1.2), (cx, cy + r * 1.2)]]
+    drawn = [*map(along, lines), around((cx, cy), r * 1.12), around((cx + 12, cy - r * 1.2), 5)]
     x, y = cx + sizes * np.cos(angle), cy - sizes * np.sin(angle)
-    parts += _masses(names, x, y, cx + 0 * sizes, cy, axes, size)
+    parts += _masses(names, x, y, cx + 0 * sizes, cy, drawn, size)
     if z is not None:
         parts += _side(names, z, sizes * np.sin(angle), chosen, size)
     return _svg(size, parts, "rotor with its masses")
 
 
 def _masses(
-    names: Sequence[str], x: Any, y: Any, x0: Any, y0: float, others: Sequence[Box], height: float
+    names: Sequence[str], x: Any, y: Any, x0: Any, y0: float, drawn: Sequence[Any], height: float
 ) -> Iterator[str]:
-    """Masses at (x, y) on their arms from (x0, y0), and their names, which keep clear of others."""
+    """Masses at (x, y) on their arms from (x0, y0), and their names, which keep clear of what is drawn."""
+    import numpy as np
+
     places = list(zip(names, x.tolist(), y.tolist(), x0.tolist(), strict=True))
     for _, a, b, a0 in places:
         yield f'<path d="M{a0:.1f} {y0}L{a:.1f} {b:.1f}" stroke="#1d4f91" stroke-width="1.4"/>'
         yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="7" fill="#1d4f91" stroke="#fff"/>'
-    taken: list[Box] = [*others, *((a, b, 7.0, 7.0) for _, a, b, _ in places)]
-    yield from _names([(name, a, b, "") for name, a, b, _ in places], taken, height)
+    marks = [part for _, a, b, a0 in places for part in (along([(a0, y0), (a, b)]), around((a, b), 7))]
+    taken = np.concatenate([*drawn, *marks])
+    for name, a, b, _ in places:
+        middle, own = beside(name, (a, b), taken, (WIDTH, height), LETTERS)
+        taken = np.concatenate([taken, own])
+        yield _text(middle[0], middle[1] + LETTERS / 3, name)
 
 
 def _side(names: Sequence[str], z: Any, up: Any, planes: Any, height: float) -> Iterator[str]:
@@ -241,13 +175,15 @@ def _side(names: Sequence[str], z: Any, up: Any, planes: Any, height: float) -> 
     left, right, cy, r = 285.0, WIDTH - 24, 178.0, 88.0
     scale = (right - left) / ((high - low) or 1.0)
     yield f'<rect x="{left - 14}" y="{cy - 7}" width="{right - left + 28}" height="14" fill="#ddd" stroke="#888"/>'
+    drawn = [along([(left - 14, cy + side), (right + 14, cy + side)]) for side in (-7, 7)]
     for k, (name, place) in enumerate(zip(planes.name, at.tolist(), strict=True)):
         x = left + (place - low) * scale
         yield f'<path d="M{x:.1f} {cy - 1.22 * r:.1f}V{cy + 1.22 * r:.1f}" stroke="#b35900" stroke-dasharray="6 4" stroke-width="1.5"/>'
+        drawn.append(along([(x, cy - 1.5 * r), (x, cy + 1.22 * r)]))
         yield _text(
             x, cy - 1.3 * r - (17 if k % 2 and len(planes.name) > 3 else 0), name, more='font-weight="bold"'
         )
     x = left + (z - low) * scale
-    yield from _masses(names, x, cy - up, x, cy, [], height)
+    yield from _masses(names, x, cy - up, x, cy, drawn, height)
     yield _text((left + right) / 2, cy + 1.22 * r + 24, "z →", more='font-size="13"')
     yield _text((left + right) / 2, 20, "from the side", more='font-size="13"')

@@ -30,6 +30,8 @@ LONGEST = 28
 """Most characters of the names of three and more equal curves."""
 MOST = 41
 """Most characters of a name at the side of a picture."""
+FEW = 25
+"""Of so many values each has a dot: what lies between them was not computed."""
 EQUAL = 1e-9
 """Curves that differ nowhere by more, of the largest value of all, are one."""
 
@@ -80,10 +82,13 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
     ends = []
     for k, (names, values) in enumerate(groups):
         color, dash = COLORS[k % 6], DASHES[(k + k // 6) % 6]
-        (line,) = axes.plot(x, values * factor, color=color, lw=1.5, marker="o" if len(x) == 1 else "", ms=4)
+        (line,) = axes.plot(x, values * factor, color=color, lw=1.5)
         if dash:
             line.set_dashes(dash)
         good = np.flatnonzero(np.isfinite(values))
+        dots = good if len(x) <= FEW else good[_alone(good)]
+        if len(dots):
+            line.set(marker="o", markersize=3.5, markevery=dots.tolist())
         text = shortened(_equal_ones([name for name in names if name]))
         if text and len(good):
             ends.append(_end(axes, text, x[good[-1]], values[good[-1]] * factor, color, dash))
@@ -99,6 +104,16 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
     else:
         axes.set_ylim(low, high)
     return Ends(axes, ends)
+
+
+def _alone(places: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return which of ascending whole numbers have no neighbour: no line leads to a value there.
+
+    >>> _alone(np.array([0, 2, 3, 7])).tolist()
+    [True, False, False, True]
+    """
+    gaps = np.concatenate([[True], np.diff(places) > 1, [True]])
+    return np.asarray(gaps[:-1] & gaps[1:])
 
 
 def shortened(name: str, most: int = MOST) -> str:
