@@ -175,7 +175,7 @@ function numberRow(body, name) {
   const kind = kindOf(name);
   const unit = unitOf(kind);
   const line = put(body, "div", { class: "number" });
-  put(line, "label", {}, name);
+  named(put(line, "label"), name);
   const input = numberField(line, name, { unit }, !positive.has(kind), (x, text) => change(name, x, text));
   input.addEventListener("blur", listFields);
   put(line, "span", { class: "soft" }, unit);

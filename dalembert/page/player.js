@@ -143,6 +143,7 @@ function noiseOf(column) {
 
 // --- plots ------------------------------------------------------------------------------------------------------------
 const plots = [];
+const FEW = 25; // of so many poses each has a dot: what lies between them was not computed
 function plot(column) {
   const host = put($("plots"), "div", { class: "plot" });
   const line = put(host, "div");
@@ -205,6 +206,7 @@ function plot(column) {
         let d = "";
         let pen = false;
         let before = NaN;
+        const few = values.length <= FEW;
         for (const i of sampled(values, 4000)) {
           const y = values[i];
           if (!Number.isFinite(y)) pen = false;
@@ -213,6 +215,8 @@ function plot(column) {
             before = y;
             d += (pen ? "L" : "M") + fixed(px(x[i] ?? i), py(y));
             pen = true;
+            // to a pose without neighbours no line leads
+            if (few || !(Number.isFinite(values[i - 1]) || Number.isFinite(values[i + 1]))) put(svg, "circle", { class: s ? "spot ghost" : "spot", cx: px(x[i] ?? i).toFixed(2), cy: py(y).toFixed(2), r: 2.2 });
           }
         }
         put(svg, "path", { class: s ? "curve ghost" : "curve", d });
