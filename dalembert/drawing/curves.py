@@ -48,6 +48,8 @@ class Curve(NamedTuple):
 
     name: str
     values: ArrayLike
+    level: bool = False
+    """Whether it is one value everywhere, such as a mean: its places have no dots."""
 
 
 def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, scale: float = 0.0) -> Ends:
@@ -69,6 +71,7 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
         How large a quantity of this kind is here: what is less than 1e-12 of it is drawn as zero.
     """
     clean = [(curve.name, quiet(curve.values, scale)) for curve in curves]
+    level = {curve.name for curve in curves if curve.level}
     sizes = [float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for _, v in clean]
     largest = max(sizes, default=0.0)
     factor, unit = prefixed(largest, unit)
@@ -87,7 +90,7 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
             line.set_dashes(dash)
         good = np.flatnonzero(np.isfinite(values))
         dots = good if len(x) <= FEW else good[_alone(good)]
-        if len(dots):
+        if len(dots) and not level.issuperset(names):
             line.set(marker="o", markersize=3.5, markevery=dots.tolist())
         text = shortened(_equal_ones([name for name in names if name]))
         if text and len(good):
