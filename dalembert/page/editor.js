@@ -175,10 +175,10 @@ function numberRow(body, name) {
   const kind = kindOf(name);
   const unit = unitOf(kind);
   const line = put(body, "div", { class: "number" });
-  named(put(line, "label"), name);
+  breaking(put(line, "label"), name);
   const input = numberField(line, name, { unit }, !positive.has(kind), (x, text) => change(name, x, text));
   input.addEventListener("blur", listFields);
-  put(line, "span", { class: "soft" }, unit);
+  breaking(put(line, "span", { class: "soft" }), unit);
   const range = put(line, "input", { type: "range", min: "0", max: "400", step: "1", "aria-label": TEXTS.slider(name) });
   // from half to one and a half of the first number; of what is zero some part of the size
   const first = present(name);
