@@ -120,6 +120,28 @@ def test_a_gap_makes_curves_differ() -> None:
     assert [text.get_text() for text in ends.names] == ["A", "B"]
 
 
+@pytest.mark.parametrize("count", [1, 25, 26])
+def test_what_few_values_are_of_is_seen(count: int) -> None:
+    """A line between poses that were not computed has a dot at each that was; a mean is everywhere, and has none."""
+    axes = Figure().subplots()
+    x = np.arange(count, dtype=float)
+    panel(axes, x, [Curve("A", x**2), Curve("mean", 0 * x + 0.5, level=True)], "", "N")
+    line, mean = axes.lines
+    assert (line.get_marker(), line.get_markevery()) == (
+        ("o", [*range(count)]) if count <= 25 else ("None", None)
+    )
+    assert mean.get_marker() == "None"
+
+
+def test_a_pose_between_two_gaps_is_seen() -> None:
+    """No line leads to it: of a sweep with one pose that can be assembled nothing was drawn."""
+    axes = Figure().subplots()
+    values = np.full(100, np.nan)
+    values[[0, 7, 8, 30, 99]] = 1.0, 2.0, 3.0, 4.0, 5.0
+    panel(axes, np.arange(100.0), [Curve("A", values)], "", "N")
+    assert axes.lines[0].get_markevery() == [0, 30, 99]
+
+
 @pytest.mark.parametrize("count", [2, 9, 20])
 def test_names_at_the_ends_keep_clear(count: int) -> None:
     figure = sheet(6, 0.17 * count + 1.5, Figure())
