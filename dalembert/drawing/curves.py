@@ -30,7 +30,7 @@ LONGEST = 28
 """Most characters of the names of three and more equal curves."""
 MOST = 41
 """Most characters of a name at the side of a picture."""
-FEW = 25
+FEW = 40
 """Of so many values each has a dot: what lies between them was not computed."""
 EQUAL = 1e-9
 """Curves that differ nowhere by more, of the largest value of all, are one."""

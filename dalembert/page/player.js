@@ -143,7 +143,7 @@ function noiseOf(column) {
 
 // --- plots ------------------------------------------------------------------------------------------------------------
 const plots = [];
-const FEW = 25; // of so many poses each has a dot: what lies between them was not computed
+const FEW = 40; // of so many poses each has a dot: what lies between them was not computed
 function plot(column) {
   const host = put($("plots"), "div", { class: "plot" });
   const line = put(host, "div");

@@ -239,12 +239,12 @@ def test_few_poses_and_a_pose_between_two_gaps_have_dots(
         )
         assert opened.faults() == []
     assert dots == [5, 0]
-    # at 0° it cannot be assembled, at 180° it can: of 31 poses 15, each between two gaps
+    # at 0° it cannot be assembled, at 180° it can: of 51 poses 25, each between two gaps
     (tmp_path / "m.toml").write_text(FOUR_BAR.replace("B = [40, 0]", "B = [70, 0]"))
-    done = dalembert("mechanism", "m.toml", "--over", "0:5400:180", "--page", "m.html")
+    done = dalembert("mechanism", "m.toml", "--over", "0:9000:180", "--page", "m.html")
     assert done.returncode == 0, done.stderr
     opened = Opened(browser, tmp_path / "m.html")
-    assert opened("return document.querySelector('.plot svg').querySelectorAll('circle.spot').length") == 15
+    assert opened("return document.querySelector('.plot svg').querySelectorAll('circle.spot').length") == 25
 
 
 @pytest.mark.slow
