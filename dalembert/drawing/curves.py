@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.drawing.amounts import prefixed, quiet
-from dalembert.drawing.sheet import plain, zero_alone
+from dalembert.drawing.sheet import empty, plain, zero_alone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,9 +99,13 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
     plain(axes)
     low, high = axes.get_ylim()
     values = np.concatenate([v[np.isfinite(v)] for _, v in groups]) * factor if groups else np.zeros(0)
-    if len(values) and not values.any():
+    if not len(values):
+        axes.update_datalim([(place, 0.0) for place in x], updatey=False)
+        axes.autoscale_view(scaley=False)
+        empty(axes, "no values", "y")
+    elif not values.any():
         zero_alone(axes)
-    elif len(values) and np.ptp(values) == 0:  # a constant in the middle, not on a scale of its rounding
+    elif np.ptp(values) == 0:  # a constant in the middle, not on a scale of its rounding
         about = float(values[0])
         axes.set_ylim(about - abs(about), about + abs(about))
     else:

@@ -6,6 +6,7 @@ import math
 import re
 import subprocess
 import sys
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from dalembert.drawing.curves import COLORS, DASHES, Curve, panel, spread
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.polar import FOUND, GIVEN, Vector, dial
 from dalembert.drawing.sheet import sheet
+from virtualwork import Mechanism
 
 PREFIX = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 
@@ -111,6 +113,25 @@ def test_equal_curves_are_said_once() -> None:
     assert [text.get_text() for text in ends.names] == ["A = C", "B", "D"]
     assert len(axes.lines) == 3
     assert faults(figure) == []  # type: ignore[arg-type]
+
+
+def test_without_values_no_scale_is_made_up() -> None:
+    axes = Figure().subplots()
+    x = np.linspace(5, 6, 3)
+    panel(axes, x, [Curve("A", x * np.nan)], "", "N")
+    assert len(axes.get_yticks()) == 0
+    assert axes.get_xlim()[0] <= 5 < 6 <= axes.get_xlim()[1] < 7
+    assert [text.get_text() for text in axes.texts] == ["no values"]
+    dials = Figure().add_subplot(projection="polar")
+    dial(dials, "", [Vector(0, GIVEN)])
+    assert len(dials.get_yticks()) == 0
+
+
+def test_a_mechanism_that_stands_nowhere_is_no_empty_frame() -> None:
+    m = Mechanism.from_toml(str(files("cli.examples") / "boom" / "boom.toml"))
+    axes = m.motion([5.0, 6.0]).plot(figure=Figure())
+    assert [text.get_text() for text in axes.texts] == ["cannot be assembled in any of these poses"]
+    assert len(axes.get_xticks()) == len(axes.get_yticks()) == 0
 
 
 def test_a_gap_makes_curves_differ() -> None:
