@@ -231,7 +231,7 @@ function localOf(body, point) {
 let lastStands = null;
 const handleParts = model.handles.map((handle) => {
   const [path, body] = handle;
-  const group = put(handleLayer, "g", { class: `handle ${classOf(bodyIndex(body))}`, tabindex: "0", role: "button", "data-name": path, "aria-label": TEXTS.handle(path) });
+  const group = put(handleLayer, "g", { class: `handle ${classOf(bodyIndex(body))}`, tabindex: "0", role: "button", "data-name": path, "aria-label": TEXTS.handle(path), display: "none" });
   put(group, "circle", { class: "grip", r: 16 });
   put(group, "circle", { class: "knob", r: 5 });
   put(group, "title", {}, path);
@@ -302,7 +302,7 @@ drawHandles = (stands) => {
     if (far > 1) [u, v] = [u + (gap * way[0]) / far, v + (gap * way[1]) / far];
     // a place beyond 32 bits is none in a browser
     const seen = gripped && Math.hypot(u, v) < 1e9;
-    group.style.display = seen ? "" : "none";
+    group.setAttribute("display", seen ? "inline" : "none");
     if (!seen) continue;
     group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);
     words.take(u, v, 6);

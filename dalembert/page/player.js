@@ -180,7 +180,8 @@ function plot(column) {
       const lines = data.series.map((s) => (s.hidden?.() ? [] : (s.columns[k]?.values.subarray(0, s.n) ?? [])));
       noise = noiseOf(whole.columns[k]);
       let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite).map(quiet));
-      if (!(low <= high)) [low, high] = [0, 1];
+      const nothing = !(low <= high);
+      if (nothing) [low, high] = [0, 1];
       // what varies by rounding alone is constant
       const varies = high - low > noise;
       const pad = varies ? (high - low) * 0.06 : Math.abs(high) * 0.1 || 1;
@@ -194,8 +195,8 @@ function plot(column) {
         put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
         put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 15, "text-anchor": "middle" }, short(t));
       }
-      // of what is zero everywhere a scale would be made up
-      for (const t of varies || low + high ? ticks(low, high, stepOf(low, high, 5)) : [0]) {
+      // of what is zero everywhere, or nowhere, a scale would be made up
+      for (const t of nothing ? [] : varies || low + high ? ticks(low, high, stepOf(low, high, 5)) : [0]) {
         put(svg, "line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: py(t), y2: py(t) });
         put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 3, "text-anchor": "end" }, short(t));
       }

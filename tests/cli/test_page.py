@@ -226,6 +226,23 @@ def test_a_plot_shows_any_column_and_seeks(four_bar: tuple[Opened, list[Row], li
 
 
 @pytest.mark.slow
+def test_what_stands_in_no_pose_is_not_drawn(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """Pins and handles lay in the upper left corner, and plots had a scale from 0 to 1; a pose that stands brings them."""
+    (tmp_path / "m.toml").write_text(FOUR_BAR.replace("B = [40, 0]", "B = [400, 0]"))
+    assert dalembert("mechanism", "m.toml", "--over", "0:90:45", "--page", "m.html").returncode == 1
+    opened = Opened(browser, tmp_path / "m.html")
+    drawn = "return [...document.querySelectorAll('#view circle')].filter((c) => c.getClientRects().length && c.getBoundingClientRect().width).length"
+    assert opened(drawn) == 0
+    assert (
+        opened("return document.querySelector('.plot svg').querySelectorAll('text[text-anchor=end]').length")
+        == 1
+    )
+    assert opened("return dalembert.set({'links.crank.B.x': 0.04})")
+    assert opened(drawn) > 10
+    assert opened.faults() == []
+
+
+@pytest.mark.slow
 def test_few_poses_and_a_pose_between_two_gaps_have_dots(
     dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:
