@@ -227,7 +227,7 @@ def _word(match: re.Match[str]) -> str:
 
 # how an amplitude is read, as instruments and people write it: `µm pk-pk`, `in/s 0-pk`, `mm/s RMS`
 _P = r"p(?:ea)?k?"
-_READ_AS = {"_pp": rf"{_P}[ -]*(?:to)?[ -]*{_P}", "_rms": r"r\.?m\.?s\.?|eff", "_pk": rf"(?:0-)?{_P}"}
+READ_AS = {"_pp": rf"{_P}[ -]*(?:to)?[ -]*{_P}", "_rms": r"r\.?m\.?s\.?|eff", "_pk": rf"(?:0-)?{_P}"}
 
 
 def unit_name(written: str) -> str:
@@ -237,7 +237,7 @@ def unit_name(written: str) -> str:
     ('um_pp', 'mm_s_rms', 'um_pp', 'oz_in')
     """
     last = written.strip().replace("_", " ").rpartition(" ")[2]
-    for tag, words in _READ_AS.items() if last[:1] in "0pPrReE" else ():
+    for tag, words in READ_AS.items() if last[:1] in "0pPrReE" else ():
         if match := re.fullmatch(rf"(.*[^\s_])[\s_]+(?:{words})", written.strip(), re.IGNORECASE):
             return unit_name(match[1]) + tag
     text = _spelled(written).replace("^", "")

@@ -65,13 +65,13 @@ answer(every.map((tapes, p) => {{
       else numbers[name] = x;
     }}
     const state = machine.solve(numbers, free);
-    const curve = (name) => Array.from({{ length: model.n }}, (_, l) => machine.value(state, model.quantities[name], l));
+    const curve = (name) => Array.from({{ length: model.n }}, (_, l) => machine.quantity(state, model.quantities[name])(l));
     if ({"true" if drawn else "false"}) {{
       const series = structuredClone(given[p].series);
       redraw(machine, state, series);
       return series.shapes;
     }}
-    return names.map((name) => ({"curve(name)" if curves else "machine.value(state, model.quantities[name], model.n)"}));
+    return names.map((name) => ({"curve(name)" if curves else "machine.quantity(state, model.quantities[name])(model.n)"}));
   }});
 }}));"""
     given = [

@@ -94,8 +94,15 @@ def test_an_amplitude_comes_in_the_units_of_the_file(tmp_path: Path) -> None:
         ("2 mm/s pp", "mm/s rms", "mm/s rms"),
         ("7 mV", "V", "V"),
         ("12", "counts", "counts"),
+        ("3 mil peak to peak", "µm pk-pk", "µm pk-pk"),
+        ("2 in/s RMS", "mm/s r.m.s.", "mm/s r.m.s."),
+        ("2 mm/s 0-pk", "mm/s pk-pk", "mm/s pk-pk"),
     ]
-    assert typed(tmp_path, entries) == [76.2, 76.2, 0.1, 50.8, "NaN", "NaN", 0.007, 12]
+    right = [76.2, 76.2, 0.1, 50.8, "NaN", "NaN", 0.007, 12, 76.2, 50.8, "NaN"]
+    assert typed(tmp_path, entries) == right
+    # every unit as a page writes it
+    units = [spelled(unit) for unit in LISTED["amplitude"]]
+    assert typed(tmp_path, [(f"3 {unit}", unit, unit) for unit in units]) == [3] * len(units)
 
 
 def test_the_units_of_files_to_the_same_bits(tmp_path: Path) -> None:

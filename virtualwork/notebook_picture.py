@@ -1,20 +1,20 @@
-"""A pose as a small picture in SVG, as a notebook shows a mechanism."""
+"""A pose as a small picture in SVG, as a notebook and the sheet of an exercise show a mechanism."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.drawing.beside import along, around, beside
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Drawing, Label, Line, standing
 from virtualwork.formulas.poses import Poses
 
-WIDTH, HEIGHT, EDGE = 520.0, 360.0, 26.0
-"""Pixels at most, and around the drawing."""
+EDGE = 2.2
+"""Sizes of a letter around the drawing."""
 # as visible on white as on black
 COLORS = ("#3b82f6", "#e0662a", "#2fa15a", "#a259e6", "#e0484f", "#1ba3b3", "#b98a16", "#dd4f93")
 INK = "currentColor"
@@ -31,13 +31,18 @@ LOOK = {
     "mass": (0.9, 0.0),
     "tip": (1.0, 1.0),
 }
-AROUND = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1], [1, 0], [-1, 0], [0, -1], [0, 1]])
-"""Sides on which a name may stand, y downwards; the first that is free is taken."""
 Real = NDArray[np.float64]
 
 
-def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
-    """Return the picture of one pose; None where it cannot be assembled.
+def svg(
+    poses: Poses,
+    drawing: Drawing,
+    i: int = 0,
+    *,
+    most: tuple[float, float] = (520.0, 360.0),
+    letters: float = 12.0,
+) -> str | None:
+    """Return the picture of one pose, `most` pixels wide and high, its names in `letters` of so many; None where it cannot be assembled.
 
     Colours are those of a page in the dark as in the light: what is no link has the colour of the text around.
 
@@ -58,17 +63,18 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
         return None
     low = complex(every.real.min(), every.imag.min())
     wide, high = np.ptp(every.real), np.ptp(every.imag)
-    scale = min((WIDTH - 2 * EDGE) / (wide or 1e-300), (HEIGHT - 2 * EDGE) / (high or 1e-300))
-    width, height = scale * wide + 2 * EDGE, scale * high + 2 * EDGE
+    edge = EDGE * letters
+    scale = min((most[0] - 2 * edge) / (wide or 1e-300), (most[1] - 2 * edge) / (high or 1e-300))
+    width, height = scale * wide + 2 * edge, scale * high + 2 * edge
 
     def xy(z: complex) -> tuple[float, float]:
         on = (z - low) * scale
-        return round(on.real + EDGE, 2), round(height - on.imag - EDGE, 2)
+        return round(on.real + edge, 2), round(height - on.imag - edge, 2)
 
     title = escape(poses.mechanism.name or "mechanism")
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.2f} {height:.2f}" '
-        f'role="img" style="max-width:100%" font-family="sans-serif" font-size="12"><title>{title}</title>'
+        f'role="img" style="max-width:100%" font-family="sans-serif" font-size="{letters:g}"><title>{title}</title>'
     ]
     for shape, stood in drawn:
         color = (
@@ -88,45 +94,26 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
     taken = np.concatenate([_marks(stood, xy) for _, stood in drawn])
     # names of links give way to those of points
     for label in sorted(drawing.labels, key=lambda label: label.of == "link"):
-        x, y = xy(at(label.body, label.at))
-        middle, own = _free(label.text, np.array([x, y]), taken, np.array([width, height]))
+        at_label = xy(at(label.body, label.at))
+        middle, own = beside(label.text, at_label, taken, (width, height), letters)
         taken = np.concatenate([taken, own])
-        parts.append(_name(label, float(middle[0]), float(middle[1]), _color(order, label.body)))
+        parts.append(_name(label, middle, _color(order, label.body), letters))
     return "".join([*parts, "</svg>"])
 
 
 def _marks(shape: Circle | Line, xy: Callable[[complex], tuple[float, float]]) -> Real:
     """Where a shape is drawn: pixels (k, 2) along its lines, or around its circle and in the middle."""
     if isinstance(shape, Circle):
-        around = shape.radius * np.exp(1j * np.linspace(0, 2 * np.pi, 32))
-        return np.array([xy(shape.centre + complex(z)) for z in (0, *around)])
-    ends = np.array([xy(z) for z in (*shape.points, *shape.points[: shape.closed])])
-    return np.concatenate([ends[:1], *(_along(a, b) for a, b in pairwise(ends))])
-
-
-def _along(a: Real, b: Real) -> Real:
-    """Pixels (k, 2) some 4 apart from a to b."""
-    return a + np.linspace(0, 1, 2 + int(np.hypot(*(b - a)) / 4))[:, None] * (b - a)
-
-
-def _free(text: str, at: Real, taken: Real, size: Real) -> tuple[Real, Real]:
-    """Return the middle of a name beside its place, where least is drawn, and the pixels (k, 2) that the name takes."""
-    half = np.array([3.3 * len(text), 7.0])
-    # the edge of the name is as far from its place as these
-    middles = np.concatenate([at + AROUND * (half + gap) for gap in (3.0, 9.0, 16.0)])
-    hits = (np.abs(taken - middles[:, None]) < half + 2).all(axis=2).sum(axis=1)
-    beyond = np.maximum(0, np.maximum(half - middles, middles + half - size)).sum(axis=1)
-    middle = middles[np.argmin(hits + beyond)]
-    corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    return np.round(middle, 2), np.concatenate(
-        [_along(middle - (half[0], 0), middle + (half[0], 0)), middle + corners]
-    )
+        middle, right = (np.array(xy(shape.centre + z)) for z in (0, shape.radius))
+        return around(middle, float(right[0] - middle[0]))
+    return along([xy(z) for z in (*shape.points, *shape.points[: shape.closed])])
 
 
 def _color(order: list[str], body: str) -> str:
     return INK if body == GROUND else COLORS[(order.index(body) - 1) % len(COLORS)]
 
 
-def _name(label: Label, x: float, y: float, color: str) -> str:
-    look = f'fill="{INK}"' if label.of == "point" else f'font-size="11" fill="{color}"'
+def _name(label: Label, middle: Real, color: str, letters: float) -> str:
+    x, y = middle
+    look = f'fill="{INK}"' if label.of == "point" else f'font-size="{letters - 1:g}" fill="{color}"'
     return f'<text x="{x}" y="{y}" text-anchor="middle" dominant-baseline="central" {look}>{escape(label.text)}</text>'

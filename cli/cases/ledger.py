@@ -139,6 +139,8 @@ def ledger(
     ]
     index = Column("instant", "", [str(i) for i, _ in every])
     named = [Column(c.name, c.unit, [heads[i][k].values[0] for i, _ in every]) for k, c in enumerate(joined)]
+    pose_headers = [c.header for c in named] if len(instants) > 1 else []
+    keys = ("instant", *pose_headers, "link", "kind", "point")
     several = any(entry.field for _, entry in every)
     points = any(entry.point for _, entry in every)
     shown = [
@@ -171,7 +173,7 @@ def ledger(
         [
             *before,
             Table([], ["instant"], place, documented=[pose, *joined]),
-            Table(shown, ("instant", "link", "kind"), f"{place}.terms[]", documented=[index, *documented]),
+            Table(shown, keys, f"{place}.terms[]", documented=[index, *documented]),
         ],
         "Ledger of virtual power (Riul, unit II, eqs. 3 to 5)",
     )

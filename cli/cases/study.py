@@ -41,7 +41,7 @@ METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
     "derivatives of the loop equations along the input; effort by virtual work and by Newton and Euler, joint forces by "
     "d'Alembert's principle (R. Ibrahim, Mecanismos, PMR/EPUSP; J. A. Riul, Dinâmica das Máquinas; R. Nicoletti, SEM 104). "
-    "Angles are counter-clockwise, reactions are what the link `from` exerts on the link `on`."
+    "Angles are counter-clockwise, reactions are what the link “from” exerts on the link “on”."
 )
 
 

@@ -10,14 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.exercise.variants import Variant
+from dalembert.drawing.beside import along, around, beside
 from dalembert.errors import DataError
 from dalembert.page import Page
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism
 
-WIDTH = 430.0
-"""Of a rotor's figure, in units of its own."""
+MOST = 500.0, 440.0
+"""Width and height of a mechanism's figure, pixels."""
+WIDTH, LETTERS = 430.0, 15.0
+"""Width of a rotor's figure, and the size of letters, pixels."""
 
 
 def figure(variant: Variant) -> str:
@@ -57,8 +60,8 @@ def _given(path: Any) -> str:
 
 def _svg(height: float, parts: Sequence[str], label: str) -> str:
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" '
-        f'aria-label="{html.escape(label)}" font-family="Arial, Liberation Sans, sans-serif" font-size="15" fill="none" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" width="{WIDTH:.0f}" height="{height:.0f}" '
+        f'role="img" aria-label="{html.escape(label)}" font-family="Arial, Liberation Sans, sans-serif" font-size="{LETTERS:g}" fill="none" '
         f'stroke-linejoin="round" stroke-linecap="round">{"".join(parts)}</svg>'
     )
 
@@ -80,32 +83,7 @@ def mechanism(variant: Variant) -> str:
 
     m = _varied(variant)
     motion = m.motion(np.array([_inputs(variant, m)]))
-    return svg(motion.poses, motion.drawing) or ""
-
-
-WAYS = [(9, -9), (-9, -9), (9, 19), (-9, 19), (14, 5), (-14, 5), (0, -14), (0, 26), (22, -20), (-22, -20)]
-"""Where a name may stand beside its place, the preferred way first."""
-Box = tuple[float, float, float, float]
-"""Middle, half the width, half the height."""
-
-
-def _names(names: Sequence[tuple[str, float, float, str]], taken: list[Box], height: float) -> Iterator[str]:
-    """The names (text, place, look), each where it meets none of the others and nothing that is taken, within the figure."""
-    for text, x, y, look in names:
-        half = 4.3 * len(text)
-        best, least = (x, y), float("inf")
-        for dx, dy in WAYS:
-            middle = x + dx + (half if dx > 0 else -half if dx < 0 else 0)
-            box = middle, y + dy - 5, half, 8.0
-            off = max(0.0, half - middle) + max(0.0, middle + half - WIDTH)
-            off += max(0.0, 8.0 - box[1]) + max(0.0, box[1] + 8.0 - height)
-            hits = sum(
-                abs(box[0] - t[0]) < box[2] + t[2] and abs(box[1] - t[1]) < box[3] + t[3] for t in taken
-            )
-            if hits + off < least:
-                best, least = (middle, y + dy), hits + off
-        taken.append((best[0], best[1] - 5, half, 8.0))
-        yield _text(*best, text, more=look)
+    return svg(motion.poses, motion.drawing, most=MOST, letters=LETTERS) or ""
 
 
 def _varied(variant: Variant) -> Mechanism:
@@ -161,24 +139,31 @@ def rotor(variant: Variant) -> str:
     ]
     far = float(radius.max()) or 1.0
     sizes = radius / far * r
-    axes: list[Box] = [(cx + r * 1.2 + 6, cy, 5.0, 8.0), (cx + 12, cy - r * 1.2, 5.0, 8.0)]
+    lines = [[(cx - r * 1.2, cy), (cx + r * 1.2 + 12, cy)], [(cx, cy - r * 1.2), (cx, cy + r * 1.2)]]
+    drawn = [*map(along, lines), around((cx, cy), r * 1.12), around((cx + 12, cy - r * 1.2), 5)]
     x, y = cx + sizes * np.cos(angle), cy - sizes * np.sin(angle)
-    parts += _masses(names, x, y, cx + 0 * sizes, cy, axes, size)
+    parts += _masses(names, x, y, cx + 0 * sizes, cy, drawn, size)
     if z is not None:
         parts += _side(names, z, sizes * np.sin(angle), chosen, size)
     return _svg(size, parts, "rotor with its masses")
 
 
 def _masses(
-    names: Sequence[str], x: Any, y: Any, x0: Any, y0: float, others: Sequence[Box], height: float
+    names: Sequence[str], x: Any, y: Any, x0: Any, y0: float, drawn: Sequence[Any], height: float
 ) -> Iterator[str]:
-    """Masses at (x, y) on their arms from (x0, y0), and their names, which keep clear of others."""
+    """Masses at (x, y) on their arms from (x0, y0), and their names, which keep clear of what is drawn."""
+    import numpy as np
+
     places = list(zip(names, x.tolist(), y.tolist(), x0.tolist(), strict=True))
     for _, a, b, a0 in places:
         yield f'<path d="M{a0:.1f} {y0}L{a:.1f} {b:.1f}" stroke="#1d4f91" stroke-width="1.4"/>'
         yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="7" fill="#1d4f91" stroke="#fff"/>'
-    taken: list[Box] = [*others, *((a, b, 7.0, 7.0) for _, a, b, _ in places)]
-    yield from _names([(name, a, b, "") for name, a, b, _ in places], taken, height)
+    marks = [part for _, a, b, a0 in places for part in (along([(a0, y0), (a, b)]), around((a, b), 7))]
+    taken = np.concatenate([*drawn, *marks])
+    for name, a, b, _ in places:
+        middle, own = beside(name, (a, b), taken, (WIDTH, height), LETTERS)
+        taken = np.concatenate([taken, own])
+        yield _text(middle[0], middle[1] + LETTERS / 3, name)
 
 
 def _side(names: Sequence[str], z: Any, up: Any, planes: Any, height: float) -> Iterator[str]:
@@ -190,13 +175,15 @@ def _side(names: Sequence[str], z: Any, up: Any, planes: Any, height: float) -> 
     left, right, cy, r = 285.0, WIDTH - 24, 178.0, 88.0
     scale = (right - left) / ((high - low) or 1.0)
     yield f'<rect x="{left - 14}" y="{cy - 7}" width="{right - left + 28}" height="14" fill="#ddd" stroke="#888"/>'
+    drawn = [along([(left - 14, cy + side), (right + 14, cy + side)]) for side in (-7, 7)]
     for k, (name, place) in enumerate(zip(planes.name, at.tolist(), strict=True)):
         x = left + (place - low) * scale
         yield f'<path d="M{x:.1f} {cy - 1.22 * r:.1f}V{cy + 1.22 * r:.1f}" stroke="#b35900" stroke-dasharray="6 4" stroke-width="1.5"/>'
+        drawn.append(along([(x, cy - 1.5 * r), (x, cy + 1.22 * r)]))
         yield _text(
             x, cy - 1.3 * r - (17 if k % 2 and len(planes.name) > 3 else 0), name, more='font-weight="bold"'
         )
     x = left + (z - low) * scale
-    yield from _masses(names, x, cy - up, x, cy, [], height)
+    yield from _masses(names, x, cy - up, x, cy, drawn, height)
     yield _text((left + right) / 2, cy + 1.22 * r + 24, "z →", more='font-size="13"')
     yield _text((left + right) / 2, 20, "from the side", more='font-size="13"')

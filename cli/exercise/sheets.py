@@ -28,7 +28,7 @@ h3 { font-size: 11pt; margin: 4mm 0 1mm; break-after: avoid }
 p { margin: 2mm 0 } table { border-collapse: collapse; margin: 2mm 0; font-size: 10pt; max-width: 100% }
 th, td { padding: 1mm 1.6mm; border: .2mm solid #bbb; text-align: left; vertical-align: top; overflow-wrap: normal } th { background: #eee }
 .n { text-align: right; font-variant-numeric: tabular-nums } tr { break-inside: avoid } .wide { overflow-x: auto }
-.dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { max-width: 132mm; margin: 4mm auto; break-inside: avoid } figure svg, figure img { display: block; max-width: 100%; height: auto; margin: 0 auto } figure svg:not([width]), figure img { width: 100% }
+.dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; max-width: 100%; height: auto; margin: 0 auto } figure img { width: 132mm }
 .blank { width: 40mm; min-width: 20mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 details.page summary { min-height: 32px; line-height: 32px; cursor: pointer } @media print { details.page { display: none } }
 section + section { break-before: page }

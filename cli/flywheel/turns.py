@@ -207,7 +207,7 @@ def draw(wheel: Flywheel) -> Figure:
     first = panel(
         above,
         angle,
-        [Curve("torque", wheel.torque), Curve("mean", np.full(len(angle), c.mean))],
+        [Curve("torque", wheel.torque), Curve("mean", np.full(len(angle), c.mean), level=True)],
         "torque",
         "N·m",
     )

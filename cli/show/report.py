@@ -231,9 +231,7 @@ def _grids(table: Table) -> Iterator[Part]:
         if column.name in ("quantity", "column"):
             cells = [spelled(cell) for cell in cells]
         texts.append(cells)
-        headers.append(
-            f"{_words(column.name)} [{written(column.unit)}]" if column.unit else _words(column.name)
-        )
+        headers.append(_headed(column))
     numbers = [
         not has_names(column.values) or all(not cell or is_number(cell.replace(",", ".")) for cell in cells)
         for column, cells in zip(table.columns, texts, strict=True)
@@ -275,6 +273,12 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def _headed(column: Column) -> str:
+    """A column's name as a head: `mass [g]`; a magnitude per g is not in g."""
+    words, unit = _words(column.name), written(column.unit)
+    return words if not unit else f"{words} {unit}" if words.endswith(" per") else f"{words} [{unit}]"
+
+
 # units of results that no input has
 _RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
 
@@ -306,8 +310,8 @@ td.n { white-space: nowrap } th, td { overflow-wrap: break-word } .long { overfl
 .warning { border-left: 1mm solid #b00020; padding-left: 2mm } .warning { margin: 1mm 0; font-size: 9pt } footer { margin-top: 2mm; font-size: 8pt; color: #444 }
 figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
 .dense { font-size: 8.5pt } .dense table { font-size: 7.5pt; line-height: 1.25; margin: 1mm 0 } .dense td, .dense th { padding-top: .2mm; padding-bottom: .2mm }
-.dense p { margin: .8mm 0 } .dense h3 { font-size: 10pt; margin: 2.5mm 0 .5mm } .dense svg { max-height: 52mm } .dense figure { margin: 1.5mm 0 }
-.verdict svg { max-height: 56mm } .wide { overflow-x: auto } section + section { break-before: page }
+.dense p { margin: .8mm 0 } .dense h3 { font-size: 10pt; margin: 2.5mm 0 .5mm } @media print { .dense svg { max-height: 52mm } .verdict svg { max-height: 56mm } } .dense figure { margin: 1.5mm 0 }
+.wide { overflow-x: auto } section + section { break-before: page }
 @page { size: A4; margin: 12mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}

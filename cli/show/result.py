@@ -302,6 +302,8 @@ def table_block(table: Table, width: int | None, rows: int | None = None, title:
     """Return a table as a terminal shows it, its sentences above and below; of a long one the first rows."""
     from dalembert.results.text import table_text
 
+    if title and table.columns and not table.length:
+        return f"{title.removesuffix(':')}: none\n"
     cells = {header: values[:rows] for header, values in table.cells.items()} if rows else table.cells
     more = f"… and {table.length - rows} further rows" if rows and table.length > rows else ""
     parts = (title or table.above, table_text(cells, table.keys, width), more, table.below)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.drawing.amounts import prefixed, quiet
-from dalembert.drawing.sheet import plain, zero_alone
+from dalembert.drawing.sheet import empty, plain, zero_alone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +30,8 @@ LONGEST = 28
 """Most characters of the names of three and more equal curves."""
 MOST = 41
 """Most characters of a name at the side of a picture."""
+FEW = 40
+"""Of so many values each has a dot: what lies between them was not computed."""
 EQUAL = 1e-9
 """Curves that differ nowhere by more, of the largest value of all, are one."""
 
@@ -46,6 +48,8 @@ class Curve(NamedTuple):
 
     name: str
     values: ArrayLike
+    level: bool = False
+    """Whether it is one value everywhere, such as a mean: its places have no dots."""
 
 
 def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, scale: float = 0.0) -> Ends:
@@ -67,6 +71,7 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
         How large a quantity of this kind is here: what is less than 1e-12 of it is drawn as zero.
     """
     clean = [(curve.name, quiet(curve.values, scale)) for curve in curves]
+    level = {curve.name for curve in curves if curve.level}
     sizes = [float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for _, v in clean]
     largest = max(sizes, default=0.0)
     factor, unit = prefixed(largest, unit)
@@ -80,10 +85,13 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
     ends = []
     for k, (names, values) in enumerate(groups):
         color, dash = COLORS[k % 6], DASHES[(k + k // 6) % 6]
-        (line,) = axes.plot(x, values * factor, color=color, lw=1.5, marker="o" if len(x) == 1 else "", ms=4)
+        (line,) = axes.plot(x, values * factor, color=color, lw=1.5)
         if dash:
             line.set_dashes(dash)
         good = np.flatnonzero(np.isfinite(values))
+        dots = good if len(x) <= FEW else good[_alone(good)]
+        if len(dots) and not level.issuperset(names):
+            line.set(marker="o", markersize=3.5, markevery=dots.tolist())
         text = shortened(_equal_ones([name for name in names if name]))
         if text and len(good):
             ends.append(_end(axes, text, x[good[-1]], values[good[-1]] * factor, color, dash))
@@ -91,14 +99,28 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
     plain(axes)
     low, high = axes.get_ylim()
     values = np.concatenate([v[np.isfinite(v)] for _, v in groups]) * factor if groups else np.zeros(0)
-    if len(values) and not values.any():
+    if not len(values):
+        axes.update_datalim([(place, 0.0) for place in x], updatey=False)
+        axes.autoscale_view(scaley=False)
+        empty(axes, "no values", "y")
+    elif not values.any():
         zero_alone(axes)
-    elif len(values) and np.ptp(values) == 0:  # a constant in the middle, not on a scale of its rounding
+    elif np.ptp(values) == 0:  # a constant in the middle, not on a scale of its rounding
         about = float(values[0])
         axes.set_ylim(about - abs(about), about + abs(about))
     else:
         axes.set_ylim(low, high)
     return Ends(axes, ends)
+
+
+def _alone(places: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return which of ascending whole numbers have no neighbour: no line leads to a value there.
+
+    >>> _alone(np.array([0, 2, 3, 7])).tolist()
+    [True, False, False, True]
+    """
+    gaps = np.concatenate([[True], np.diff(places) > 1, [True]])
+    return np.asarray(gaps[:-1] & gaps[1:])
 
 
 def shortened(name: str, most: int = MOST) -> str:

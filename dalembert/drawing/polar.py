@@ -47,11 +47,13 @@ def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = R
     """Draw vectors on polar axes, in their order, and return the labels of their tips, to be placed."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-    scale = max((abs(v.value) for v in vectors if np.isfinite(v.value)), default=0.0) or 1.0
+    largest = max((abs(v.value) for v in vectors if np.isfinite(v.value)), default=0.0)
+    scale = largest or 1.0
     axes.set_title(title, pad=10, fontsize=11)
     axes.set_rlim(0, room * scale)
     ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0, scale)
-    axes.set_rticks([tick for tick in ticks if 0 < tick <= 1.05 * scale])
+    # of nothing a scale would be made up
+    axes.set_rticks([tick for tick in ticks if 0 < tick <= 1.05 * largest])
     formatter = ScalarFormatter(useOffset=False)
     formatter.set_scientific(False)
     axes.yaxis.set_major_formatter(formatter)

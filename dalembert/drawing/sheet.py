@@ -60,3 +60,10 @@ def zero_alone(axes: Axes, which: str = "y") -> None:
     for name in which:
         getattr(axes, f"set_{name}lim")(-1, 1)
         getattr(axes, f"set_{name}ticks")([0])
+
+
+def empty(axes: Axes, why: str, which: str = "xy") -> None:
+    """Let axes that have nothing to show say why; they have no numbers: a scale would be made up."""
+    for name in which:
+        getattr(axes, f"set_{name}ticks")([])
+    axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", va="center", color="0.3", fontsize=9)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -26,7 +25,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dalembert.decimals import Factor
-from dalembert.units import ABBREVIATIONS, AMPLITUDES, JOINED, LARGEST, PER_MINUTE, SIGNS, TAGS, WORDS
+from dalembert.units import (
+    ABBREVIATIONS,
+    AMPLITUDES,
+    JOINED,
+    LARGEST,
+    PER_MINUTE,
+    READ_AS,
+    SIGNS,
+    TAGS,
+    WORDS,
+    written,
+)
 
 Json = Any
 
@@ -98,18 +108,18 @@ def _unit_table() -> Json:
         "signs": SIGNS,
         "joined": JOINED,
         "perMinute": PER_MINUTE,
+        "readAs": {tag[1:]: words for tag, words in READ_AS.items()},
         "largest": LARGEST,
     }
 
 
 def spelled(unit: str) -> str:
-    """A unit of a header as people write it.
+    """A unit of a header as people write it; degrees in letters, as they are typed.
 
-    >>> spelled("m_s2"), spelled("N_m"), spelled("N_s_per_m"), spelled("kg_m3"), spelled("mm_s_rms")
-    ('m/s2', 'N m', 'N s/m', 'kg/m3', 'mm/s rms')
+    >>> spelled("m_s2"), spelled("N_m"), spelled("N_s_per_m"), spelled("kg_m3"), spelled("mm_s_rms"), spelled("deg")
+    ('m/s²', 'N·m', 'N·s/m', 'kg/m³', 'mm/s r.m.s.', 'deg')
     """
-    divided = re.sub(r"(?<=[a-z])_(?=(s[23]?|c?m3)(_pk|_pp|_rms)?$)", "/", unit.replace("_per_", "/"))
-    return divided.replace("_", " ")
+    return written(unit).replace("°", "deg")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,11 @@ function make(name, attributes = {}, text) {
 function put(parent, ...rest) {
   return parent.appendChild(make(...rest));
 }
+// a name or a unit that breaks, where it must, after its dots, underscores and slashes
+function breaking(element, text) {
+  element.append(...text.split(/(?<=[._·/])/).flatMap((piece, k) => (k ? [make("wbr"), piece] : [piece])));
+  return element;
+}
 function svgIn(host, label) {
   return put(host, "svg", { role: "img", ...(label && { "aria-label": label }) });
 }
@@ -22,13 +27,13 @@ function grid(host, caption, heads, attributes = {}) {
   const table = put(box, "table", attributes);
   if (caption) put(table, "caption", {}, caption);
   const head = put(put(table, "thead"), "tr");
-  for (const text of heads) put(head, "th", { scope: "col" }, text);
+  for (const text of heads) breaking(put(head, "th", { scope: "col" }), text);
   const body = put(table, "tbody");
   return {
     box,
     row(name, attributes) {
       const line = put(body, "tr", attributes);
-      put(line, "th", { scope: "row" }, name);
+      breaking(put(line, "th", { scope: "row" }), name);
       return line;
     },
   };

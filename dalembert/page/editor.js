@@ -175,10 +175,10 @@ function numberRow(body, name) {
   const kind = kindOf(name);
   const unit = unitOf(kind);
   const line = put(body, "div", { class: "number" });
-  put(line, "label", {}, name);
+  breaking(put(line, "label"), name);
   const input = numberField(line, name, { unit }, !positive.has(kind), (x, text) => change(name, x, text));
   input.addEventListener("blur", listFields);
-  put(line, "span", { class: "soft" }, unit);
+  breaking(put(line, "span", { class: "soft" }), unit);
   const range = put(line, "input", { type: "range", min: "0", max: "400", step: "1", "aria-label": TEXTS.slider(name) });
   // from half to one and a half of the first number; of what is zero some part of the size
   const first = present(name);
@@ -231,7 +231,7 @@ function localOf(body, point) {
 let lastStands = null;
 const handleParts = model.handles.map((handle) => {
   const [path, body] = handle;
-  const group = put(handleLayer, "g", { class: `handle ${classOf(bodyIndex(body))}`, tabindex: "0", role: "button", "data-name": path, "aria-label": TEXTS.handle(path) });
+  const group = put(handleLayer, "g", { class: `handle ${classOf(bodyIndex(body))}`, tabindex: "0", role: "button", "data-name": path, "aria-label": TEXTS.handle(path), display: "none" });
   put(group, "circle", { class: "grip", r: 16 });
   put(group, "circle", { class: "knob", r: 5 });
   put(group, "title", {}, path);
@@ -302,7 +302,7 @@ drawHandles = (stands) => {
     if (far > 1) [u, v] = [u + (gap * way[0]) / far, v + (gap * way[1]) / far];
     // a place beyond 32 bits is none in a browser
     const seen = gripped && Math.hypot(u, v) < 1e9;
-    group.style.display = seen ? "" : "none";
+    group.setAttribute("display", seen ? "inline" : "none");
     if (!seen) continue;
     group.setAttribute("transform", `translate(${u.toFixed(1)} ${v.toFixed(1)})`);
     words.take(u, v, 6);
@@ -334,12 +334,13 @@ window.dalembert = {
   get(name) {
     if (isName(name)) return wrong.has(name) ? NaN : present(name);
     const quantity = model.quantities[name];
-    return quantity ? machine.value(state, quantity, shown) : NaN;
+    return quantity ? machine.quantity(state, quantity)(shown) : NaN;
   },
   curve(name) {
     const quantity = model.quantities[name];
     const j = inputNames.indexOf(name);
-    return Array.from({ length: n }, (_, l) => (j >= 0 ? machine.sweep[j][l] : quantity ? machine.value(state, quantity, l) : NaN));
+    const at = j >= 0 ? (l) => machine.sweep[j][l] : quantity ? machine.quantity(state, quantity) : () => NaN;
+    return Array.from({ length: n }, (_, l) => at(l));
   },
   limits: () => machine.limits(numbers).map(([q]) => q),
   options,

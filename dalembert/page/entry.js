@@ -1,9 +1,13 @@
 // Numbers that are typed, with their units; numbers that are shown, with the digits that hold.
 // --- units: words, and words joined, as `composed` of the program's table of units reads them ----------------------------------
-const { signs, joined, perMinute, largest, ...unitTable } = data.unitTable;
+const { signs, joined, perMinute, readAs, largest, ...unitTable } = data.unitTable;
 const [unitWords, inFull] = [unitTable.words, unitTable.inFull].map((table) => new Map(Object.entries(table)));
 function plainUnit(text) {
   if (new RegExp(`^(?:${perMinute})$`).test(text.toLowerCase())) return "rpm";
+  for (const [mark, words] of Object.entries(readAs)) {
+    const [, size] = new RegExp(`^(.*[^\\s_])[\\s_]+(?:${words})$`, "i").exec(text) ?? [];
+    if (size) return `${plainUnit(size)} ${mark}`;
+  }
   const plain = text.replace(/[^\x00-\x7f]/g, (sign) => (Object.hasOwn(signs, sign) ? signs[sign] : sign)).replaceAll("**", "^").replace(/([A-Za-z])-(?=[A-Za-z])/g, "$1*");
   return plain.replace(/[A-Za-z]+/g, (word) => {
     const parts = new RegExp(`^(?:${joined})$`).exec(word);
@@ -198,7 +202,7 @@ function tool(text, act) {
 // a wrong entry leaves nothing to take away, as it leaves no answer
 function copied(text) {
   outbox.hidden = !text;
-  outbox.value = text;
+  if (outbox.value !== text) outbox.value = text;
   if (!text) return;
   outbox.select();
   const done = () => {

@@ -36,19 +36,19 @@ function enter(last) {
   return entering;
 }
 let standing = [];
-// a reading is an amplitude with its phase, a mass stands at an angle: what is missing of them
-const missingHalves = () => sheet.runs.flatMap((run, k) => [
+// a reading is an amplitude with its phase, a mass stands at an angle: what is missing of them in a run
+const missingHalves = (k) => [
   ...sheet.sensors.map((sensor, s) => [sensor, reading(k, s, "amplitude"), TEXTS.amplitude, reading(k, s, "phase"), TEXTS.phase]),
   ...(k ? sheet.planes.map((plane, p) => [plane, onRotor(k, p, word), TEXTS[word], onRotor(k, p, "angle"), TEXTS.angle]) : []),
-].filter(([, size, , angle]) => has(size) !== has(angle)).map(([of, size, sizeWord, , angleWord]) => TEXTS.half(run, of, has(size) ? angleWord : sizeWord)));
+].filter(([, size, , angle]) => has(size) !== has(angle)).map(([of, size, sizeWord, , angleWord]) => TEXTS.half(sheet.runs[k], of, has(size) ? angleWord : sizeWord));
+const halved = () => sheet.runs.some((_, k) => missingHalves(k).length);
 const readIn = (k) => sheet.sensors.some((_, s) => has(reading(k, s, "amplitude")) || has(reading(k, s, "phase")));
 
 const usedIn = (k) => readIn(k) || [...wrong.keys()].some((name) => name.startsWith(`${sheet.runs[k]}/`)) || (k > 0 && sheet.planes.some((_, p) => has(onRotor(k, p, word)) || has(onRotor(k, p, "angle"))));
 
 solveSheet = () => {
   [doubts, idle, beyond, standing] = [[], [], [], []];
-  idle.push(...missingHalves());
-  if (idle.length) return;
+  if (halved()) return;
   let out = null;
   let last = 0;
   for (let k = 0; k < sheet.runs.length; k++) {
@@ -138,6 +138,7 @@ function splitOn(plane) {
 const placeNames = new Map(); // plane -> the names of its two places
 
 const boxes = []; // of each run
+const missingLines = []; // below its fields: what is missing of them
 function build() {
   $("entries").querySelectorAll("fieldset, .scroll").forEach((one) => one.remove());
   inputs.clear();
@@ -151,14 +152,16 @@ function build() {
       cell(put(line, "td"), reading(k, s, "amplitude"), "amplitude", amplitudeUnit, { positive: true, empty: k > 0 });
       cell(put(line, "td"), reading(k, s, "phase"), "angle", "deg", { empty: k > 0 });
     });
-    if (!k) continue;
-    put(box, "p", { class: "soft" }, TEXTS.standing);
-    const masses = grid(box, "", vectorHeads, { class: "cells" });
-    sheet.planes.forEach((plane, p) => {
-      const line = masses.row(plane);
-      cell(put(line, "td"), onRotor(k, p, word), sheet.mass.kind, sheet.mass.unit, { positive: true, empty: true });
-      cell(put(line, "td"), onRotor(k, p, "angle"), "angle", "deg", { empty: true });
-    });
+    if (k) {
+      put(box, "p", { class: "soft" }, TEXTS.standing);
+      const masses = grid(box, "", vectorHeads, { class: "cells" });
+      sheet.planes.forEach((plane, p) => {
+        const line = masses.row(plane);
+        cell(put(line, "td"), onRotor(k, p, word), sheet.mass.kind, sheet.mass.unit, { positive: true, empty: true });
+        cell(put(line, "td"), onRotor(k, p, "angle"), "angle", "deg", { empty: true });
+      });
+    }
+    missingLines[k] = put(box, "p", { class: "doubt", role: "status" });
   }
   update();
 }
@@ -198,6 +201,7 @@ drawSheet = () => {
   for (const [k, box] of boxes.entries()) {
     box.classList.toggle("unused", k > 0 && !usedIn(k));
     box.hidden = k > last + 1;
+    missingLines[k].textContent = missingHalves(k).join(" ");
   }
   const turn = Math.PI / 180;
   for (const text of beyond) put(host, "p", { class: "doubt", role: "status" }, text);
@@ -236,7 +240,7 @@ drawSheet = () => {
 
 function csv() {
   // a half of a reading or of a mass is no row
-  if (wrong.size || missingHalves().length) return "";
+  if (wrong.size || halved()) return "";
   const speeds = sheet.channels.some(([, speed]) => speed !== null);
   const lines = [["run", "sensor", ...(speeds ? [`speed_${sheet.speedUnit}`] : []), `amplitude_${sheet.amplitude.header}`, "phase_deg", "trial_plane", `trial_${word}_${sheet.mass.header}`, "trial_angle_deg"].join(",")];
   for (const [k, run] of sheet.runs.entries()) {

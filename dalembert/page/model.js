@@ -361,14 +361,17 @@ class Machine extends Way {
     return twice.slice(0, -1).map(([high, low], r) => Math.abs(high - state.rows[r][l] + low));
   }
 
-  // a quantity at a pose, SI and radians
-  value(state, { row, less, turns, order, zero, locks }, l) {
-    if (!state.rows || !Number.isFinite(state.closed[l])) return NaN;
-    if (zero) return 0;
-    if (locks && state.locked.has(l)) return NaN;
-    if (order && !this.moves(state)) return NaN;
-    const x = state.rows[row][l] - (less === undefined ? 0 : state.rows[less][l]);
-    return turns && x < 0 ? (x + TAU < TAU ? x + TAU : 0) : x + 0;
+  // a quantity as a function of the pose, SI and radians
+  quantity(state, { row, less, turns, order, zero, locks }) {
+    if (!state.rows || (order && !zero && !this.moves(state))) return () => NaN;
+    const [closed, values, others] = [state.closed, state.rows[row], state.rows[less]];
+    return (l) => {
+      if (!Number.isFinite(closed[l])) return NaN;
+      if (zero) return 0;
+      if (locks && state.locked.has(l)) return NaN;
+      const x = others ? values[l] - others[l] : values[l];
+      return turns && x < 0 ? (x + TAU < TAU ? x + TAU : 0) : x + 0;
+    };
   }
 
   // whether there are rates: the file has a speed, be it zero, or something moves
@@ -406,13 +409,13 @@ function begin(data) {
 const changes = () => Object.keys(numbers).filter((path) => !Object.is(numbers[path], machine.own[path]));
 function recompute(series) {
   state = wrong.size ? { chosen: false } : machine.solve(numbers, freePose);
-  // what one of a unit is in SI, or how many of it make one: the one of them that is a whole number is exact
-  const inUnit = (x, si) => (si < 1 && Math.abs(Math.round(1 / si) * si - 1) < 1e-15 ? x * Math.round(1 / si) : x / si);
   for (const column of series.columns) {
     const si = column.si ?? 1;
-    if ("input" in column) {
-      for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(l < machine.n ? machine.sweep[column.input][l] : freePose[column.input], si);
-    } else for (let l = 0; l <= machine.n; l++) column.values[l] = inUnit(machine.value(state, column, l), si);
+    // what one of a unit is in SI, or how many of it make one: the one of them that is a whole number is exact
+    const many = Math.round(1 / si);
+    const whole = si < 1 && Math.abs(many * si - 1) < 1e-15;
+    const at = "input" in column ? (l) => (l < machine.n ? machine.sweep[column.input][l] : freePose[column.input]) : machine.quantity(state, column);
+    for (let l = 0; l <= machine.n; l++) column.values[l] = whole ? at(l) * many : at(l) / si;
   }
   const paths = machine.tapes.paths && state.rows ? machine.paths(state) : null;
   for (const point of series.points) point.path = paths?.get(point.name);

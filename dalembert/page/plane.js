@@ -82,14 +82,16 @@ const bar = put(layers.over, "path", { class: "scale" });
 const drawn = { names: true, velocity: false, acceleration: false, forces: whole.forces.length > 0, centres: false, polygon: false };
 const traced = new Set(whole.points.filter((p) => p.trace).map((p) => p.name));
 
-function drawFigure({ series, group, parts }, i) {
+function drawFigure(figure, i) {
+  const { series, group, parts } = figure;
   if (series.hidden?.()) {
     group.style.display = "none";
     return null;
   }
   const stands = series.bodies.map((_, b) => stand(series, b, i));
-  // a page that computes keeps the last good pose, greyed
-  const kept = data.model && series === whole;
+  // a page that computes keeps the last good pose, greyed, where there was one
+  figure.stood ||= real(stands);
+  const kept = data.model && series === whole && figure.stood;
   group.style.display = real(stands) || kept ? "" : "none";
   if (kept) group.classList.toggle("gone", !real(stands));
   if (!real(stands)) return null;

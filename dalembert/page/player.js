@@ -143,6 +143,7 @@ function noiseOf(column) {
 
 // --- plots ------------------------------------------------------------------------------------------------------------
 const plots = [];
+const FEW = 40; // of so many poses each has a dot: what lies between them was not computed
 function plot(column) {
   const host = put($("plots"), "div", { class: "plot" });
   const line = put(host, "div");
@@ -163,17 +164,24 @@ function plot(column) {
   let cursor, dot, px, py;
   let noise = 0;
   const quiet = (y) => (Math.abs(y) < noise ? 0 : y);
+  let width;
   const chart = {
+    // the width is read where the window has changed: it makes the browser lay out the whole page
+    lay() {
+      width = Math.max(200, host.clientWidth);
+      chart.draw();
+    },
     draw() {
       const k = Number(choice.value);
-      const [width, height] = [Math.max(200, host.clientWidth), 150];
+      const height = 150;
       svg.replaceChildren();
       sized(svg, width, height);
       put(svg, "title", {}, whole.columns[k].header);
       const lines = data.series.map((s) => (s.hidden?.() ? [] : (s.columns[k]?.values.subarray(0, s.n) ?? [])));
       noise = noiseOf(whole.columns[k]);
       let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite).map(quiet));
-      if (!(low <= high)) [low, high] = [0, 1];
+      const nothing = !(low <= high);
+      if (nothing) [low, high] = [0, 1];
       // what varies by rounding alone is constant
       const varies = high - low > noise;
       const pad = varies ? (high - low) * 0.06 : Math.abs(high) * 0.1 || 1;
@@ -187,8 +195,8 @@ function plot(column) {
         put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
         put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 15, "text-anchor": "middle" }, short(t));
       }
-      // of what is zero everywhere a scale would be made up
-      for (const t of varies || low + high ? ticks(low, high, stepOf(low, high, 5)) : [0]) {
+      // of what is zero everywhere, or nowhere, a scale would be made up
+      for (const t of nothing ? [] : varies || low + high ? ticks(low, high, stepOf(low, high, 5)) : [0]) {
         put(svg, "line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: py(t), y2: py(t) });
         put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 3, "text-anchor": "end" }, short(t));
       }
@@ -199,6 +207,7 @@ function plot(column) {
         let d = "";
         let pen = false;
         let before = NaN;
+        const few = values.length <= FEW;
         for (const i of sampled(values, 4000)) {
           const y = values[i];
           if (!Number.isFinite(y)) pen = false;
@@ -207,13 +216,15 @@ function plot(column) {
             before = y;
             d += (pen ? "L" : "M") + fixed(px(x[i] ?? i), py(y));
             pen = true;
+            // to a pose without neighbours no line leads
+            if (few || !(Number.isFinite(values[i - 1]) || Number.isFinite(values[i + 1]))) put(svg, "circle", { class: s ? "spot ghost" : "spot", cx: px(x[i] ?? i).toFixed(2), cy: py(y).toFixed(2), r: 2.2 });
           }
         }
         put(svg, "path", { class: s ? "curve ghost" : "curve", d });
       }
       cursor = put(svg, "line", { class: "cursor", y1: margin.top, y2: height - margin.bottom });
       dot = put(svg, "circle", { class: "dot", r: 4.5 });
-      this.at(shown);
+      chart.at(shown);
     },
     at(i) {
       const y = quiet(whole.columns[Number(choice.value)].values[i]);
@@ -245,7 +256,7 @@ function plot(column) {
     host.remove();
   });
   plots.push(chart);
-  chart.draw();
+  chart.lay();
 }
 
 // --- the beginning ------------------------------------------------------------------------------------------------------
@@ -256,7 +267,7 @@ function start(scene) {
   watchers.push((i) => plots.forEach((one) => one.at(i)));
   const lay = () => {
     scene.resize();
-    plots.forEach((one) => one.draw());
+    plots.forEach((one) => one.lay());
     show(shown);
   };
   lay();

@@ -14,6 +14,7 @@ import pytest
 from tests.cli.exercises import EXERCISE, ROTOR, rotor_exercise, rows
 from tests.cli.pages import Opened
 from tests.conftest import Dalembert
+from tests.svg_names import svg_faults, svg_names
 from virtualwork import Mechanism
 
 
@@ -223,3 +224,45 @@ def test_a_mechanism_of_every_kind_has_a_figure(dalembert: Dalembert, tmp_path: 
     # every point and link has its name
     m = Mechanism.from_toml(file)
     assert all(f">{name}</text>" in sheet for name in (*m.points, *m.links))
+
+
+def test_names_of_a_sheet_s_mechanism_stand_beside_the_lines(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Names of the Klann leg's links and points stood on its lines; a tall mechanism is not stretched to the page's width."""
+    assert dalembert("examples", "exercise-klann").returncode == 0
+    assert dalembert("exercise", "exercise-klann.toml", "--students", 6, "-o", "out").returncode == 0
+    for k in range(1, 7):
+        (picture,) = re.findall(r"<svg.*?</svg>", (tmp_path / "out" / f"sheet-{k}.html").read_text())
+        assert len(svg_names(picture)) == 13
+        assert svg_faults(picture) == []
+        root = ET.fromstring(picture)
+        assert float(root.get("width", "")) <= 500
+        assert float(root.get("height", "")) <= 440
+
+
+def test_names_of_a_sheet_s_rotor_stand_beside_the_arms(dalembert: Dalembert, tmp_path: Path) -> None:
+    """None of the middles of two names, and no mass, is within a name."""
+    (tmp_path / "rotor.csv").write_text(
+        "name,mass_kg,radius_mm,angle_deg,z_mm\n"
+        + "".join(f"W{k},1,{40 - k},{10 * k},{20 + k}\n" for k in range(6))
+    )
+    (tmp_path / "e.toml").write_text(
+        'command = "balance rotor.csv --plane A:0mm:20mm --plane B:90mm:20mm"\n'
+        '[[ask]]\nquantity = "mass_kg"\nwhere = { plane = "A" }\n'
+    )
+    assert dalembert("exercise", "e.toml", "-o", "out").returncode == 0
+    (picture,) = re.findall(r"<svg.*?</svg>", (tmp_path / "out" / "sheet-1.html").read_text())
+    root = ET.fromstring(picture)
+    svg = "{http://www.w3.org/2000/svg}"
+    texts = [(str(t.text), float(t.get("x", "")), float(t.get("y", "")) - 5) for t in root.iter(f"{svg}text")]
+    masses = [
+        (float(c.get("cx", "")), float(c.get("cy", "")))
+        for c in root.iter(f"{svg}circle")
+        if c.get("r") == "7" and c.get("stroke") == "#fff"
+    ]
+    assert len(masses) == 12
+    for k, (name, x, y) in enumerate(texts):
+        if name.startswith("W"):
+            assert not any(abs(x - a) < 8 and abs(y - b) < 6 for a, b in masses), name
+            assert not any(
+                abs(x - a) < 14 and abs(y - b) < 11 for other, a, b in texts[:k] if other[0] == "W"
+            )

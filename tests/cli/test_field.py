@@ -270,6 +270,10 @@ def test_four_run(dalembert: Dalembert) -> None:
     assert fix["mass_kg"] == pytest.approx(16.36431e-3, rel=1e-6)
     assert fix["angle_deg"] == pytest.approx(89.9562, abs=1e-4)
     assert done["rotors"][0]["misfit"][0]["amplitude"] == pytest.approx(0.0595, abs=1e-4)
+    assert (
+        "\nAlternatives: none\n"
+        in dalembert("field", "-", "--method", "four-run", "--text", stdin=table(*rows, head=head)).stdout
+    )
     three = document(
         dalembert("field", "-", "--method", "four-run", "--json", stdin=table(*rows[:3], head=head))
     )

@@ -226,6 +226,45 @@ def test_a_plot_shows_any_column_and_seeks(four_bar: tuple[Opened, list[Row], li
 
 
 @pytest.mark.slow
+def test_what_stands_in_no_pose_is_not_drawn(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """Pins and handles lay in the upper left corner, and plots had a scale from 0 to 1; a pose that stands brings them."""
+    (tmp_path / "m.toml").write_text(FOUR_BAR.replace("B = [40, 0]", "B = [400, 0]"))
+    assert dalembert("mechanism", "m.toml", "--over", "0:90:45", "--page", "m.html").returncode == 1
+    opened = Opened(browser, tmp_path / "m.html")
+    drawn = "return [...document.querySelectorAll('#view circle')].filter((c) => c.getClientRects().length && c.getBoundingClientRect().width).length"
+    assert opened(drawn) == 0
+    assert (
+        opened("return document.querySelector('.plot svg').querySelectorAll('text[text-anchor=end]').length")
+        == 1
+    )
+    assert opened("return dalembert.set({'links.crank.B.x': 0.04})")
+    assert opened(drawn) > 10
+    assert opened.faults() == []
+
+
+@pytest.mark.slow
+def test_few_poses_and_a_pose_between_two_gaps_have_dots(
+    dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    dots = []
+    for at in ("0:180:45", "0:180:1"):
+        assert dalembert("mechanism", "m.toml", "--over", at, "--page", "m.html").returncode == 0
+        opened = Opened(browser, tmp_path / "m.html")
+        dots.append(
+            opened("return document.querySelector('.plot svg').querySelectorAll('circle.spot').length")
+        )
+        assert opened.faults() == []
+    assert dots == [5, 0]
+    # at 0° it cannot be assembled, at 180° it can: of 51 poses 25, each between two gaps
+    (tmp_path / "m.toml").write_text(FOUR_BAR.replace("B = [40, 0]", "B = [70, 0]"))
+    done = dalembert("mechanism", "m.toml", "--over", "0:9000:180", "--page", "m.html")
+    assert done.returncode == 0, done.stderr
+    opened = Opened(browser, tmp_path / "m.html")
+    assert opened("return document.querySelector('.plot svg').querySelectorAll('circle.spot').length") == 25
+
+
+@pytest.mark.slow
 def test_it_fits_a_phone(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     opened = four_bar[0]
     for width in (360, 768, 1200):

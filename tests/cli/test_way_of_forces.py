@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -196,6 +197,25 @@ def test_the_way_is_on_the_terminal_and_in_the_report(dalembert: Any, copied: An
     for text in (done.stdout, report.read_text()):
         assert "Ti3·ω3 = 80·(−50) = −4 000 W" in text
         assert "T2 = 103 000 N·m" in text
+
+
+def test_every_part_of_a_wide_ledger_names_its_pose(dalembert: Any, copied: Any, tmp_path: Path) -> None:
+    """The parts of a table that is wider than the page had the link, but not the input: of which pose nobody saw."""
+    copied("door-closer")
+    report = tmp_path / "r.html"
+    done = dalembert("forces", "door.toml", "--over", "0deg:90deg:45deg", "--steps", "--report", str(report))
+    assert done.returncode == 0, done.stderr
+    heads = [
+        re.findall(r"<th[^>]*>(.*?)</th>", head)
+        for head in re.findall(r"<thead>(.*?)</thead>", report.read_text(), re.S)
+    ]
+    ledger = [
+        head
+        for head in heads
+        if "kind" in head and ("power [W]" in head or "Fx [N]" in head) and "x [m]" not in head
+    ]
+    assert len(ledger) == 2
+    assert all(head[:3] == ["input [°]", "link", "kind"] for head in ledger)
 
 
 def test_a_link_that_carries_a_motor_has_their_common_centre(dalembert: Any, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import math
 import re
 import subprocess
 import sys
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from dalembert.drawing.curves import COLORS, DASHES, Curve, panel, spread
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.polar import FOUND, GIVEN, Vector, dial
 from dalembert.drawing.sheet import sheet
+from virtualwork import Mechanism
 
 PREFIX = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 
@@ -113,11 +115,52 @@ def test_equal_curves_are_said_once() -> None:
     assert faults(figure) == []  # type: ignore[arg-type]
 
 
+def test_without_values_no_scale_is_made_up() -> None:
+    axes = Figure().subplots()
+    x = np.linspace(5, 6, 3)
+    panel(axes, x, [Curve("A", x * np.nan)], "", "N")
+    assert len(axes.get_yticks()) == 0
+    assert axes.get_xlim()[0] <= 5 < 6 <= axes.get_xlim()[1] < 7
+    assert [text.get_text() for text in axes.texts] == ["no values"]
+    dials = Figure().add_subplot(projection="polar")
+    dial(dials, "", [Vector(0, GIVEN)])
+    assert len(dials.get_yticks()) == 0
+
+
+def test_a_mechanism_that_stands_nowhere_is_no_empty_frame() -> None:
+    m = Mechanism.from_toml(str(files("cli.examples") / "boom" / "boom.toml"))
+    axes = m.motion([5.0, 6.0]).plot(figure=Figure())
+    assert [text.get_text() for text in axes.texts] == ["cannot be assembled in any of these poses"]
+    assert len(axes.get_xticks()) == len(axes.get_yticks()) == 0
+
+
 def test_a_gap_makes_curves_differ() -> None:
     axes = Figure().subplots()
     x = np.linspace(0, 1, 5)
     ends = panel(axes, x, [Curve("A", x), Curve("B", np.where(x > 0.5, np.nan, x))], "", "N")
     assert [text.get_text() for text in ends.names] == ["A", "B"]
+
+
+@pytest.mark.parametrize("count", [1, 40, 41])
+def test_what_few_values_are_of_is_seen(count: int) -> None:
+    """A line between poses that were not computed has a dot at each that was; a mean is everywhere, and has none."""
+    axes = Figure().subplots()
+    x = np.arange(count, dtype=float)
+    panel(axes, x, [Curve("A", x**2), Curve("mean", 0 * x + 0.5, level=True)], "", "N")
+    line, mean = axes.lines
+    assert (line.get_marker(), line.get_markevery()) == (
+        ("o", [*range(count)]) if count <= 40 else ("None", None)
+    )
+    assert mean.get_marker() == "None"
+
+
+def test_a_pose_between_two_gaps_is_seen() -> None:
+    """No line leads to it: of a sweep with one pose that can be assembled nothing was drawn."""
+    axes = Figure().subplots()
+    values = np.full(100, np.nan)
+    values[[0, 7, 8, 30, 99]] = 1.0, 2.0, 3.0, 4.0, 5.0
+    panel(axes, np.arange(100.0), [Curve("A", values)], "", "N")
+    assert axes.lines[0].get_markevery() == [0, 30, 99]
 
 
 @pytest.mark.parametrize("count", [2, 9, 20])

@@ -204,7 +204,7 @@ def _effort(axes: Axes, d: Dynamics, x: Reals, largest: float) -> Ends:
     if len(m.inputs) == 1 and len(x) > 1:
         mean = float(np.trapezoid(d.effort[:, 0], x) / (x[-1] - x[0]))
         if np.isfinite(mean):
-            lines.append(Curve("mean", np.full(len(x), mean)))
+            lines.append(Curve("mean", np.full(len(x), mean), level=True))
     what = f"{'force' if slides[0] else 'torque'} at the input"
     ends = panel(axes, x, lines, what, unit, largest * (1.0 if any(slides) else m.size))
     axes.axhline(0, color="0.6", lw=0.8, zorder=1)

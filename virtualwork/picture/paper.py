@@ -9,7 +9,7 @@ import numpy as np
 
 from dalembert.drawing.amounts import dimensioned
 from dalembert.drawing.labels import Label, place
-from dalembert.drawing.sheet import plain, sheet
+from dalembert.drawing.sheet import empty, plain, sheet
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Coil, Drawing, Shape, draw, tracers
 from virtualwork.formulas.kinematics import Slide
@@ -132,6 +132,9 @@ class _Paper:
             labels = self._names(first) + labels
             title = " — ".join(filter(None, (self.m.name, self._where(first))))
         axes.set_title(title, fontsize=10)
+        if not self.shown:
+            empty(axes, "cannot be assembled in any of these poses")
+            return axes
         axes.set_xlabel(f"x, {self.unit}")
         axes.set_ylabel(f"y, {self.unit}")
         plain(axes)
