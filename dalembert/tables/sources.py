@@ -110,6 +110,22 @@ class Source:
             unnamed_first=False,
         )
 
+    def named(self, names: Sequence[str]) -> Source:
+        """Return the table with its columns under these names; one that two columns would share stays, and what was read is said."""
+        read = [
+            (k, each, name)
+            for k, (each, name) in enumerate(zip(self.headings, names, strict=True))
+            if name != each.name and names.count(name) == 1
+        ]
+        if not read:
+            return self
+        headings = list(self.headings)
+        for k, each, name in read:
+            headings[k] = Heading(each.written, name)
+        taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
+        self.warnings.append(f"{self.file}: read {taken}")
+        return replace(self, headings=headings)
+
     def filled(self, columns: Iterable[int]) -> list[int]:
         """Return those of some columns that have a header, or a cell that is not blank."""
         columns = list(columns)
