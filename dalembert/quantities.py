@@ -121,7 +121,7 @@ def number_expected(text: str) -> str:
     """
     if re.fullmatch(_WITH_THOUSANDS, text):
         return "a number without marks between its thousands"
-    if (parts := number_and_unit(text.replace(",", "."))) and composed(parts[1]):
+    if (parts := number_and_unit(text.replace(",", "."))) and parts[1] and composed(parts[1]):
         return "a number alone: its unit stands in the header"
     try:
         large = abs(float(text)) > LARGEST and any(map(str.isdigit, text))

@@ -296,6 +296,7 @@ _WORDS = {
     "amplitude": "amplitude amp schwingung schwingungen schwingweg schwinggeschwindigkeit schwingbeschleunigung vibration vibracao "
     "vibracion amplitud displacement velocity acceleration valor wert",
     "phase": "phase phasenlage phasenwinkel fase fase_angular angle_de_phase",
+    "date": "date datum data fecha",
     "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht massa_de_teste massa_de_prova "
     "massa_tentativa masa_de_prueba peso_de_prueba masse_d_essai masse_test",
     "trial_angle": "trial_angle testwinkel probewinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",

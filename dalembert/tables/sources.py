@@ -157,10 +157,12 @@ class Source:
         if self.sheet is None:
             return
         used = set(columns)
-        top = next(islice(self.everything(), self.above, None))[0] - 1
+        # merged cells within header and units part no values
+        head = [line for line, _ in islice(self.everything(), self.above + 1 + self.units_below)]
+        top, rows = head[self.above] - 1, head[-1]
         self._warn_of_unseen(used, top)
         for (row, column), (value, expected) in sorted(self.sheet.faults.items()):
-            if row >= top and column in used:
+            if row >= rows and column in used:
                 raise self.sheet.error((row, column), value, expected)
 
     def _warn_of_unseen(self, used: set[int], top: int) -> None:
