@@ -144,6 +144,14 @@ def test_a_german_table_of_torque(header: str, dalembert: Dalembert) -> None:
     assert done.returncode == 0
 
 
+def test_a_recording_with_a_german_time(dalembert: Dalembert) -> None:
+    rows = "".join(f"{k};{int(k % 20 == 3)};{k % 20}\n" for k in range(100))
+    plain = dalembert("signal", "-", stdin=f"t_ms;mark;A_um\n{rows}")
+    assert plain.returncode == 0, plain.stderr
+    for time in ("Zeit [ms]", "time_ms"):
+        assert dalembert("signal", "-", stdin=f"{time};Mark;A [µm]\n{rows}").stdout == plain.stdout
+
+
 @pytest.mark.parametrize(
     ("mass", "expected"),
     [
