@@ -281,8 +281,8 @@ class Runs:
     """The limits that the file states, plane -> SI."""
     lags: bool = False
     """Whether runs show that the phase lags, so that phases were turned round."""
-    lagging_files: list[str] = field(default_factory=list)
-    """Files of stored coefficients that were measured with a phase that lags."""
+    stored_lags: dict[str, bool] = field(default_factory=dict)
+    """Files of stored coefficients, and whether they state that they were measured with a phase that lags."""
     runout: dict[str, complex] = field(default_factory=dict)
     """That of a file, sensor -> vector as the instrument shows it."""
     exact_runout: Callable[[], dict[str, Vectors]] | None = None
