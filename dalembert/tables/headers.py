@@ -285,6 +285,7 @@ _WORDS = {
     "radius": "radius radii halbmesser wuchtradius raio radio rayon r",
     "diameter": "diameter durchmesser diametro diametre",
     "angle": "angle winkel winkellage drehwinkel kurbelwinkel angulo ang theta position_angulaire winkelposition",
+    "turned": "turned drehwinkel gedreht umschlagwinkel verdrehung verdrehwinkel",
     "z": "z axial axial_position abstand lage posicao_axial posicion_axial position_axiale cote distance ebenenlage",
     "unbalance": "unbalance imbalance unwucht desbalanceamento desbalanco desequilibrio balourd",
     "plane": "plane ebene ausgleichsebene plano plano_de_correcao plano_de_correccion plan plan_de_correction",

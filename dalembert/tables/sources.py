@@ -138,7 +138,8 @@ class Source:
         return [k for k in columns if self.headings[k].written or k in used]
 
     def error(self, index: int, column: str, value: str, expected: str) -> DataError:
-        """Make the one line for a cell of a row of data; `column` as the header spells it."""
+        """Make the one line for a cell of a row of data; `column` as the header spells it, or by the name it was read as."""
+        column = next((each.written for each in self.headings if each.name == column), column)
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
             return cell_error(self.file, index + 1, line, column, value, expected)

@@ -150,8 +150,7 @@ class Table:
     def error(self, index: int, column: str, value: object, expected: str) -> DataError:
         """Make the one line for a cell of a column, as the header or the command names it."""
         assert self._source is not None
-        named = (each.written for each in self._source.headings if each.name == column)
-        return self._source.error(index, next(named, column), str(value), expected)
+        return self._source.error(index, column, str(value), expected)
 
     def reject(self, bad: NDArray[np.bool_], quantity: str, expected: str) -> None:
         """Raise the error of the first cell of a number column for which `bad` holds."""

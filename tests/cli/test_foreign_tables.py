@@ -144,6 +144,32 @@ def test_a_german_table_of_torque(header: str, dalembert: Dalembert) -> None:
     assert done.returncode == 0
 
 
+@pytest.mark.parametrize(
+    ("header", "plain"),
+    [
+        ("Umschlagwinkel [Grad];Unwucht [g mm];Winkel [Grad]", "turned_deg;unbalance_g_mm;angle_deg"),
+        ("Drehwinkel [°];Schwingweg [µm];Phase [°]", "turned_deg;amplitude_um;phase_deg"),
+        ("turned_deg;Unwucht [g mm];Winkel [°]", "turned_deg;unbalance_g_mm;angle_deg"),
+    ],
+)
+def test_a_german_table_of_positions(header: str, plain: str, dalembert: Dalembert) -> None:
+    rows = "0;5,5;30\n180;4;100\n"
+    done = dalembert("index", "-", stdin=f"{header}\n{rows}")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("index", "-", stdin=f"{plain}\n{rows}").stdout
+
+
+def test_a_german_run_out(dalembert: Dalembert, tmp_path: Path) -> None:
+    runs = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,5,40,,,\n1,1,6,90,A,10,0\n"
+    (tmp_path / "plain.csv").write_text("sensor;amplitude_um;phase_deg\n1;0,5;30\n")
+    (tmp_path / "german.csv").write_text("Lager;Schwingweg [µm];Phase [Grad]\n1;0,5;30\n", encoding="utf-8")
+    german, plain = (
+        dalembert("field", "-", "--runout", f"{name}.csv", stdin=runs) for name in ("german", "plain")
+    )
+    assert german.returncode == 0, german.stderr
+    assert german.stdout == plain.stdout
+
+
 def test_a_recording_with_a_german_time(dalembert: Dalembert) -> None:
     rows = "".join(f"{k};{int(k % 20 == 3)};{k % 20}\n" for k in range(100))
     plain = dalembert("signal", "-", stdin=f"t_ms;mark;A_um\n{rows}")
