@@ -104,11 +104,11 @@ def read_recording(path: str, pulses: int) -> Recording:
         raise DataError(f"{file}: the columns {', '.join(marks)}: expected a mark and one tacho")
     if others and pulses > 1:
         raise bad("--pulses", f"{file} has a mark and a tacho: the pulses of a turn are counted")
-    time = "time" if any(name.lower().startswith("time_") for name in header) else "t"
+    time = "t" if any(name.lower().startswith("t_") for name in header) else "time"
     units = _vibration(file, header, (time, *marks))
     unit = next(iter(units.values()))
     numbers = {time: "time", **dict.fromkeys(marks, "number"), **dict.fromkeys(units, "amplitude")}
-    table = read(path, numbers=numbers, headers=_without_volts)
+    table = read(path, numbers=numbers, needed=[(time,)], headers=_without_volts)
     t = table.require(time, "time")
     signal = np.stack([table.numbers[name].values for name in units], axis=1)
     tacho = others[0] if others else None

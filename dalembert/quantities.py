@@ -87,6 +87,10 @@ def exactly_in_degrees(angle: Fraction) -> Fraction:
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
 
 
+# one mark between all thousands, another one for decimals
+_WITH_THOUSANDS = r"[-+]?\d{1,3}(?:([^\d\w+-])\d{3})(?:\1\d{3})*(?:(?!\1)[.,]\d+)?"
+
+
 def number_and_unit(text: str) -> tuple[str, str] | None:
     """Take a quantity apart: its decimals and the unit behind them as it is written; None where it begins with no number.
 
@@ -124,9 +128,13 @@ def parse_number(text: str) -> float:
 def number_expected(text: str) -> str:
     """Return the expected value in place of a text that `parse_number` refuses: a number, or a smaller one.
 
-    >>> number_expected("five"), number_expected("1e300")
-    ('a number', 'a number of at most 1e+60')
+    >>> number_expected("five"), number_expected("1e300"), number_expected("1.234,5"), number_expected("10.5 g")
+    ('a number', 'a number of at most 1e+60', 'a number without marks between its thousands', 'a number alone: its unit stands in the header')
     """
+    if re.fullmatch(_WITH_THOUSANDS, text):
+        return "a number without marks between its thousands"
+    if (parts := number_and_unit(text.replace(",", "."))) and parts[1] and composed(parts[1]):
+        return "a number alone: its unit stands in the header"
     try:
         large = abs(float(text)) > LARGEST and any(map(str.isdigit, text))
     except ValueError:

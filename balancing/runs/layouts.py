@@ -246,19 +246,7 @@ def _translated(source: Source) -> Source:
             names[place] = "trial_plane"
         elif column is not None and (whole or (column.kind not in own and _is_word(words))):
             names[place] = f"{column.kind}_{column.unit}" if column.unit else column.kind
-    read = [
-        (k, each, name)
-        for k, (each, name) in enumerate(zip(source.headings, names, strict=True))
-        if name != each.name and names.count(name) == 1
-    ]
-    if not read:
-        return source
-    taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
-    source.warnings.append(f"{source.file}: read {taken}")
-    headings = list(source.headings)
-    for k, each, name in read:
-        headings[k] = Heading(each.written, name)
-    return replace(source, headings=headings)
+    return source.named(names)
 
 
 def _stem(each: Heading) -> str:

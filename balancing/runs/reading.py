@@ -113,7 +113,7 @@ class _Reading:
             return Measured(ordered, None, None, [], self.together)
         unit, warnings = files[0].unit, [warning for one in files for warning in one.table.warnings]
         runs.other_masses = unit not in UNITS[runs.per]
-        runs.lagging_files = [one.table.file for one in files if one.lags]
+        runs.stored_lags = {one.table.file: one.lags for one in files}
         # stored coefficients stand for trial runs; without an initial run, or with several, all runs are fitted with them
         if not self.together and ordered.leave_out_loaded():
             runs.mass_unit = unit

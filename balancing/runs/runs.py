@@ -285,8 +285,8 @@ class Runs:
     """The limits that the file states, plane -> SI."""
     lags: bool = False
     """Whether runs show that the phase lags, so that phases were turned round."""
-    lagging_files: list[str] = field(default_factory=list)
-    """Files of stored coefficients that were measured with a phase that lags."""
+    stored_lags: dict[str, bool] = field(default_factory=dict)
+    """Files of stored coefficients, and whether they state that they were measured with a phase that lags."""
     runout: dict[str, complex] = field(default_factory=dict)
     """That of a file, sensor -> vector as the instrument shows it."""
     exact_runout: Callable[[], dict[str, Vectors]] | None = None
@@ -388,7 +388,7 @@ def channels_of(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
 _ISO = re.compile(
     r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
 )
-_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
+_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4}|\d{2})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
 DATE = "a date such as 2019-03-14, 2019-03-14 08:30 or 14.03.2019"
 YEAR = 365.25
 
@@ -402,29 +402,33 @@ def years(table: Table) -> Real | None:
 
 
 def _year(table: Table, row: int, text: str) -> float:
-    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
-    match = iso or points
-    if match is None:
+    at = _date(text)
+    if at is None:
         raise table.error(row, "date", text, DATE)
-    first, month, last, *clock = match.groups()
-    year, day = (first, last or "1") if iso else (last, first)
-    try:
-        hour, minute, second = (int(part or 0) for part in clock)
-        at = datetime(int(year), int(month), int(day), hour, minute, second)
-    except ValueError:
-        raise table.error(row, "date", text, DATE) from None
     # in days first, so that no digit is lost
     return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR
 
 
+def _date(text: str) -> datetime | None:
+    """Read a date; None where it is none.
+
+    >>> _date("14.3.19 08:30"), _date("2019-02-30")
+    (datetime.datetime(2019, 3, 14, 8, 30), None)
+    """
+    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
+    match = iso or points
+    if match is None:
+        return None
+    first, month, last, *clock = match.groups()
+    year, day = (first, last or "1") if iso else (last, first)
+    try:
+        hour, minute, second = (int(part or 0) for part in clock)
+        return datetime(int(year) + 2000 * (len(year) == 2), int(month), int(day), hour, minute, second)
+    except ValueError:
+        return None
+
+
 def latest(table: Table) -> str | None:
     """Return the last date of a table, as 2019-03-14; None where none can be read."""
-    matches = [
-        _ISO.fullmatch(text) or _POINTS.fullmatch(text) for text in table.texts.get("date", ()) if text
-    ]
-    days = []
-    for match in filter(None, matches):
-        first, month, last = match.groups()[:3]
-        year, day = (first, last or "01") if match.re is _ISO else (last, first)
-        days.append(f"{year}-{int(month):02}-{int(day):02}")
-    return max(days, default=None)
+    dates = [at for at in map(_date, table.texts.get("date", ())) if at is not None]
+    return str(max(dates).date()) if dates else None

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 def read_runout(path: str, runs: Runs) -> dict[str, complex]:
     """Read the run-out vector of each sensor as the instrument shows it, in the runs' amplitude unit."""
-    table = read(path, numbers={"amplitude": "amplitude", "phase": "angle"}, texts=["sensor"])
+    dimensions, needed = {"amplitude": "amplitude", "phase": "angle"}, [("amplitude",), ("phase",)]
+    table = read(path, numbers=dimensions, texts=["sensor"], needed=needed)
     amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
     size = runs.in_unit(amplitude.values, amplitude.unit, f"{table.file}: the run-out")

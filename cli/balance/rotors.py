@@ -37,6 +37,7 @@ DIMENSIONS = {
     "z": "length",
 }
 """The dimensions of the columns of a table of masses."""
+AMOUNTS = ("mass", "weight", "unbalance")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,26 +54,28 @@ class Rotors:
     mass_unit: str
     unbalance_unit: str
     radius_unit: str | None
-    weights: bool
+    weight_unit: str
+    """Empty where the table has masses or unbalances."""
 
     def exact(self, gravity: float) -> Vectors:
         """The unbalances of the decimals of the file, in 32 digits."""
         from dalembert.tables.exact import vectors, written
 
         read = self.table.numbers
-        amount = next(read[name] for name in ("mass", "weight", "unbalance") if name in read)
+        amount = next(read[name] for name in AMOUNTS if name in read)
         sizes = amount.exact
         if "radius" in read and amount is not read.get("unbalance"):
             sizes = [size * radius for size, radius in zip(sizes, read["radius"].exact, strict=True)]
-        if self.weights:
+        if self.weight_unit:
             sizes = [size / written(gravity) for size in sizes]
         return vectors(sizes, read["angle"])
 
 
 def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     """Read masses or weights with their radii, or unbalances, with angles and, if needed, axial positions."""
-    table = read(path, numbers=DIMENSIONS, texts=["rotor", "name"])
-    amounts = [name for name in ("mass", "weight", "unbalance") if name in table.numbers]
+    needed = [AMOUNTS, ("radius", "unbalance"), ("angle",), *([("z",)] if needs_z else [])]
+    table = read(path, numbers=DIMENSIONS, texts=["rotor", "name"], needed=needed)
+    amounts = [name for name in AMOUNTS if name in table.numbers]
     if len(amounts) > 1:
         both = " and ".join(table.numbers[name].header for name in amounts)
         raise DataError(
@@ -108,10 +111,10 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         size,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
-        column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
+        {"lbf": "lb"}.get(column.unit, "kg") if amount == "weight" else column.unit.split("_")[0],
         column.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
         radius_unit,
-        amount == "weight",
+        column.unit if amount == "weight" else "",
     )
 
 

@@ -54,13 +54,20 @@ def _not_turned(b: FieldBalancing) -> Iterator[str]:
 
 
 def _other_sense(b: FieldBalancing) -> Iterator[str]:
-    """Name the stored coefficients of a phase that lags where the phases of the runs were not reversed."""
+    """Name the stored coefficients of a phase that lags where the phases of the runs were not reversed, and the other way round."""
     leads = b.request.lagging is None and not all(b.against(solved.group).all() for solved in b.solved)
-    for file in b.runs.lagging_files if leads else ():
-        yield (
-            f"{file}: the coefficients were measured with a phase that lags, and the phases of the runs were not reversed: with "
-            "the same instrument add --phase-lag, or the angles are wrong; if the phase of this instrument leads, add --rotation ccw"
-        )
+    for file, lagged in b.runs.stored_lags.items():
+        if lagged and leads:
+            yield (
+                f"{file}: the coefficients were measured with a phase that lags, and the phases of the runs were not reversed: with "
+                "the same instrument add --phase-lag, or the angles are wrong; if the phase of this instrument leads, add --rotation ccw"
+            )
+        if b.request.lagging and not lagged:
+            yield (
+                f"{file}: the phases of the runs were reversed, and the file does not state that the phase lagged when its coefficients "
+                "were measured: if the phase of the instrument leads, leave out --phase-lag, or the angles are wrong; if it lagged "
+                "then too, add a column phase_sense with lag to the file"
+            )
 
 
 def _without_trials(groups: list[_Group]) -> Iterator[str]:

@@ -87,7 +87,7 @@ def read_torque(path: str, speed: float, coefficient: float) -> Flywheel:
     DataError
         Angles that fall, or that do not span whole turns: the message says what would be whole.
     """
-    table = read(path, numbers={"angle": "angle", "torque": "torque"})
+    table = read(path, numbers={"angle": "angle", "torque": "torque"}, needed=[("angle",), ("torque",)])
     angle, torque = table.require("angle", "angle"), table.require("torque", "torque")
     falls = np.concatenate([[False], np.diff(angle.values) < 0])
     table.reject(falls, "angle", "an angle that is not less than that of the row before")

@@ -83,7 +83,9 @@ def read_positions(path: str, phase_lag: bool) -> Positions:
         "amplitude": "amplitude",
         "phase": "angle",
     }
-    table = read(path, numbers=dimensions, texts=["rotor", "plane", "sensor"], layout=parted_cells)
+    texts = ["rotor", "plane", "sensor"]
+    needed = [("turned",), ("unbalance", "amplitude"), ("angle", "phase")]
+    table = read(path, numbers=dimensions, texts=texts, needed=needed, layout=parted_cells)
     turned = table.require("turned", "angle")
     if "unbalance" in table.numbers and "amplitude" in table.numbers:
         both = " and ".join(table.numbers[name].header for name in ("unbalance", "amplitude"))

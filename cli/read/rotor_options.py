@@ -101,7 +101,8 @@ def from_options(specs: Sequence[str], flag: str = "--plane", *, sought: bool = 
 
 def from_table(path: str) -> Planes:
     """Read a table with the columns plane, radius_* and, but for single planes, z_*; rotor where they differ."""
-    table = read(path, numbers={"z": "length", "radius": "length"}, texts=["plane", "rotor"])
+    needed = [("plane",), ("radius",)]
+    table = read(path, numbers={"z": "length", "radius": "length"}, texts=["plane", "rotor"], needed=needed)
     names, rotor = table.needed("plane"), table.texts.get("rotor")
     radius = table.require("radius", "length")
     table.reject(~(radius.values >= SMALLEST), "radius", "a positive radius")

@@ -43,7 +43,7 @@ class Heading:
 
     def with_unit(self, cell: str, dimensions: Mapping[str, str]) -> Heading:
         """Return the heading with the unit of the row below; ValueError with the unit that the header itself has."""
-        unit = "" if cell.strip() in NO_UNIT else unit_name(cell.strip().strip("[]()"))
+        unit = _unit_name(cell)
         if not unit:
             return self
         for quantity, dimension in dimensions.items():
@@ -76,7 +76,17 @@ def _parted(written: str) -> tuple[str, str]:
         base, unit = match.group(1), match.group(2) or match.group(3) or ""
     elif re.search(r"[,\s]", written) and (match := re.match(_PARTED, written)) and is_unit(match.group(2)):
         base, unit = match.groups()
-    return plain(base), "" if unit.strip() in NO_UNIT else unit_name(unit)
+    return plain(base), _unit_name(unit)
+
+
+def _unit_name(written: str) -> str:
+    """A unit in a header or in the row below, in brackets or not; degrees are `Grad` in German.
+
+    >>> _unit_name("[Grad]"), _unit_name("mm/s"), _unit_name(" - ")
+    ('deg', 'mm_s', '')
+    """
+    bare = written.strip().strip("[]()")
+    return "" if bare.strip() in NO_UNIT else "deg" if bare == "Grad" else unit_name(bare)
 
 
 @cache
@@ -91,7 +101,7 @@ def plain(name: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Whether a text is the name of a unit, in brackets or not."""
-    return bool(dimensions(unit_name(text.strip().strip("[]()"))))
+    return bool(dimensions(_unit_name(text)))
 
 
 # name here -> header in the file (the option --column), and which were met
@@ -229,27 +239,53 @@ def likeness(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: 
 
 def offers(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> list[str]:
     """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
+    from shlex import quote
+
     out = []
     for each in headings:
-        base, unit = (each.base, each.unit) if each.unit else parted(each.base)
-        quantity = quantity_meant(base, (*dimensions, *texts))
+        base, unit = _stem(each)
+        quantity, fit = _meant(base, unit, dimensions, texts)
+        if not quantity:
+            quantity = quantity_meant(base, dimensions)
+            fit = next(iter(UNITS[dimensions[quantity]])) if quantity else ""
         if quantity:
-            from shlex import quote
-
-            dimension = dimensions.get(quantity)
-            fit = "" if dimension is None else find_unit(dimension, unit) or next(iter(UNITS[dimension]))
             out.append(f"--column {quantity}{'_' * bool(fit)}{fit}={quote(each.written)}")
     return out
+
+
+def translated(headings: Sequence[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> list[str]:
+    """Return the names that foreign words in headers mean; where the unit does not fit, or two would share one, the own name."""
+    names = [each.name for each in headings]
+    for place, each in enumerate(headings):
+        base, unit = _stem(each)
+        quantity, unit = _meant(base, unit, dimensions, texts)
+        if quantity and plain_word(base) != quantity:
+            names[place] = f"{quantity}{'_' * bool(unit)}{unit}"
+    return names
+
+
+def _stem(each: Heading) -> tuple[str, str]:
+    """Return the words of a header, and the unit behind them."""
+    return (each.base, each.unit) if each.unit else parted(each.base)
+
+
+def _meant(base: str, unit: str, dimensions: Mapping[str, str], texts: Sequence[str]) -> tuple[str, str]:
+    """Return the quantity that a word means and the name of its unit: `Gewicht` in N is a weight, in g a mass."""
+    units = {name: find_unit(dimension, unit) for name, dimension in dimensions.items()}
+    fits: dict[str, str] = {name: of for name, of in units.items() if of is not None}
+    quantity = quantity_meant(base, (*fits, *texts))
+    return quantity, fits.get(quantity, "")
 
 
 # -- what quantities are called in English, German, Portuguese, Spanish and French: for hints alone --------
 
 _WORDS = {
-    "mass": "mass masse massa masa gewicht",
+    "mass": "mass masse wuchtmasse massa masa gewicht",
     "weight": "weight gewichtskraft gewicht peso poids force_poids",
-    "radius": "radius radii halbmesser raio radio rayon r",
+    "radius": "radius radii halbmesser wuchtradius raio radio rayon r",
     "diameter": "diameter durchmesser diametro diametre",
-    "angle": "angle winkel winkellage angulo ang theta position_angulaire winkelposition",
+    "angle": "angle winkel winkellage drehwinkel kurbelwinkel angulo ang theta position_angulaire winkelposition",
+    "turned": "turned drehwinkel gedreht umschlagwinkel verdrehung verdrehwinkel",
     "z": "z axial axial_position abstand lage posicao_axial posicion_axial position_axiale cote distance ebenenlage",
     "unbalance": "unbalance imbalance unwucht desbalanceamento desbalanco desequilibrio balourd",
     "plane": "plane ebene ausgleichsebene plano plano_de_correcao plano_de_correccion plan plan_de_correction",
@@ -261,6 +297,7 @@ _WORDS = {
     "amplitude": "amplitude amp schwingung schwingungen schwingweg schwinggeschwindigkeit schwingbeschleunigung vibration vibracao "
     "vibracion amplitud displacement velocity acceleration valor wert",
     "phase": "phase phasenlage phasenwinkel fase fase_angular angle_de_phase",
+    "date": "date datum data fecha",
     "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht massa_de_teste massa_de_prova "
     "massa_tentativa masa_de_prueba peso_de_prueba masse_d_essai masse_test",
     "trial_angle": "trial_angle testwinkel probewinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",

@@ -110,6 +110,22 @@ class Source:
             unnamed_first=False,
         )
 
+    def named(self, names: Sequence[str]) -> Source:
+        """Return the table with its columns under these names; one that two columns would share stays, and what was read is said."""
+        read = [
+            (k, each, name)
+            for k, (each, name) in enumerate(zip(self.headings, names, strict=True))
+            if name != each.name and names.count(name) == 1
+        ]
+        if not read:
+            return self
+        headings = list(self.headings)
+        for k, each, name in read:
+            headings[k] = Heading(each.written, name)
+        taken = ", ".join(f"{quote(each.written)} as {name}" for _, each, name in read)
+        self.warnings.append(f"{self.file}: read {taken}")
+        return replace(self, headings=headings)
+
     def filled(self, columns: Iterable[int]) -> list[int]:
         """Return those of some columns that have a header, or a cell that is not blank."""
         columns = list(columns)
@@ -122,7 +138,8 @@ class Source:
         return [k for k in columns if self.headings[k].written or k in used]
 
     def error(self, index: int, column: str, value: str, expected: str) -> DataError:
-        """Make the one line for a cell of a row of data; `column` as the header spells it."""
+        """Make the one line for a cell of a row of data; `column` as the header spells it, or by the name it was read as."""
+        column = next((each.written for each in self.headings if each.name == column), column)
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
             return cell_error(self.file, index + 1, line, column, value, expected)
@@ -141,10 +158,12 @@ class Source:
         if self.sheet is None:
             return
         used = set(columns)
-        top = next(islice(self.everything(), self.above, None))[0] - 1
+        # merged cells within header and units part no values
+        head = [line for line, _ in islice(self.everything(), self.above + 1 + self.units_below)]
+        top, rows = head[self.above] - 1, head[-1]
         self._warn_of_unseen(used, top)
         for (row, column), (value, expected) in sorted(self.sheet.faults.items()):
-            if row >= top and column in used:
+            if row >= rows and column in used:
                 raise self.sheet.error((row, column), value, expected)
 
     def _warn_of_unseen(self, used: set[int], top: int) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from dalembert.dataclass import dataclass, field
 from dalembert.errors import DataError, quote
 from dalembert.quantities import is_number, number_expected, parse_number
-from dalembert.tables.headers import Heading, find_columns, offers, spellings
+from dalembert.tables.headers import Heading, find_columns, offers, spellings, translated
 from dalembert.tables.sources import DASHES, Source, open_source, without_dashes
 from dalembert.units import LARGEST, UNITS, to_si
 
@@ -148,7 +148,7 @@ class Table:
                     raise self.error(i, name, cell, WITH_COMMA) from None
 
     def error(self, index: int, column: str, value: object, expected: str) -> DataError:
-        """Make the one line for a cell: `column` as the header spells it."""
+        """Make the one line for a cell of a column, as the header or the command names it."""
         assert self._source is not None
         return self._source.error(index, column, str(value), expected)
 
@@ -202,6 +202,7 @@ def read(
     cells: Mapping[str, str] | None = None,
     blank: Sequence[str] = (),
     marker: str = "",
+    needed: Sequence[Sequence[str]] = (),
     headers: Callable[[list[str]], list[str]] | None = None,
     layout: Callable[[Source], Source] | None = None,
 ) -> Table:
@@ -221,6 +222,8 @@ def read(
         The columns whose cells may be empty, or a dash in their place: numbers read as NaN, others as no text.
     marker
         Cells of `numbers` that begin with it are no numbers: NaN, and their text in `Table.marks`.
+    needed
+        Sets of columns of which the table needs one: where it has none, words of other languages in its header are taken too.
     headers
         What the header as written means: the columns' names by their places.
     layout
@@ -243,6 +246,9 @@ def read(
         ]
     texts = [each.name for each in source.headings if each.name] if texts is None else texts
     found = find_columns(source.file, source.headings, dimensions, texts)
+    if not all(any(name in found for name in names) for names in needed):
+        source = source.named(translated(source.headings, dimensions, texts))
+        found = find_columns(source.file, source.headings, dimensions, texts)
     columns = [
         _Column(
             name,
@@ -317,7 +323,7 @@ def _number_expected(text: str, decimal_comma: bool) -> str:
     'a number: decimal commas need columns separated by ; or tabs'
     """
     if decimal_comma:
-        return WITH_COMMA
+        return WITH_COMMA if is_number(text) else number_expected(text)
     if text.count(",") == 1 and "." not in text and is_number(text.replace(",", ".")):
         return "a number: decimal commas need columns separated by ; or tabs"
     return number_expected(text)

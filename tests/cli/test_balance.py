@@ -66,15 +66,28 @@ def test_csv_when_piped_table_on_request_json_to_file(
     assert json.loads((tmp_path / "out.JSON").read_text())["rotors"][0]["corrections"][0]["mass_kg"] == mass
 
 
+IN_INCHES = ("--plane", "A:0in:2in", "--plane", "B:4in:2in")
+
+
 def test_output_units_are_the_input_units(dalembert: Dalembert) -> None:
     inch = "weight_lbf,radius_in,angle_rad,z_in\n2,3,0.5,1\n"
-    done = dalembert("balance", "-", "--plane", "A:0in:2in", "--plane", "B:4in:2in", stdin=inch)
+    done = dalembert("balance", "-", *IN_INCHES, stdin=inch)
     assert (
-        done.stdout.splitlines()[0] == "rotor,plane,z_in,radius_in,unbalance_oz_in,mass_kg,weight_N,angle_deg"
+        done.stdout.splitlines()[0]
+        == "rotor,plane,z_in,radius_in,unbalance_oz_in,mass_lb,weight_lbf,angle_deg"
     )
     first = rows(done.stdout)[0]
     assert float(first["unbalance_oz_in"]) == pytest.approx(2 * 16 * 3 * 3 / 4, rel=1e-14)
-    assert float(first["mass_kg"]) == pytest.approx(2 * 0.45359237 * 3 * 3 / 4 / 2, rel=1e-14)
+    for column in ("mass_lb", "weight_lbf"):
+        assert float(first[column]) == pytest.approx(2 * 3 * 3 / 4 / 2, rel=1e-14)
+    assert "W = 2.25 lbf" in dalembert("balance", "-", *IN_INCHES, "--steps", stdin=inch).stdout
+    document = answer(dalembert("balance", "-", *IN_INCHES, "--json", stdin=inch))["rotors"][0][
+        "corrections"
+    ][0]
+    assert document["mass_kg"] == pytest.approx(2.25 * 0.45359237, rel=1e-14)
+    assert document["weight_N"] == pytest.approx(2.25 * 0.45359237 * 9.80665, rel=1e-14)
+    newton = dalembert("balance", "-", "--plane", "A:2mm", stdin="weight_kN,radius_mm,angle_deg\n1,2,30\n")
+    assert newton.stdout.splitlines()[0] == "rotor,plane,radius_mm,unbalance_g_mm,mass_kg,weight_kN,angle_deg"
     direct = "unbalance_g_mm,angle_deg\n500,90\n"
     done = dalembert("balance", "-", "--plane", "fan:25mm", stdin=direct)
     assert (

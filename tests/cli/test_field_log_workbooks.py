@@ -153,3 +153,39 @@ def test_a_faulty_cell_of_a_log_is_named_by_its_place(dalembert: Dalembert, tmp_
     done = dalembert("field", "log.xlsx")
     assert done.returncode == 1
     assert "cell B4, column DoubleA: found 'much', expected a number" in done.stderr
+
+
+def test_merged_cells_of_a_header_part_no_values(dalembert: Dalembert, tmp_path: Path) -> None:
+    rows: Rows = [
+        ("Lauf", "Lager A", None, "Lager B", None, "Masse", "Winkel"),
+        (None, "mm/s", "°", "mm/s", "°", "g", "Grad"),
+        (0, 5, 40, 4, 100, None, None),
+        (1, 6, 90, 4.5, 110, 10, 0),
+    ]
+    xlsx(tmp_path / "plain.xlsx", rows)
+    plain = dalembert("field", "plain.xlsx", "--json")
+    book = openpyxl.load_workbook(tmp_path / "plain.xlsx")
+    for merged in ("A1:A2", "B1:C1", "D1:E1"):
+        book.active.merge_cells(merged)
+    book.save(tmp_path / "merged.xlsx")
+    assert rotor(dalembert("field", "merged.xlsx", "--json")) == rotor(plain)
+    # from the units into the values, and among the values
+    for merged in ("A2:A3", "C3:C4"):
+        book = openpyxl.load_workbook(tmp_path / "plain.xlsx")
+        book.active.merge_cells(merged)
+        book.save(tmp_path / "merged.xlsx")
+        done = dalembert("field", "merged.xlsx")
+        assert (done.returncode, done.stdout) == (1, "")
+        assert f"merged cells {merged}, expected a value in each cell" in done.stderr
+
+
+@pytest.mark.parametrize("date", ["14.3.19", "14.03.2019", "2019-03-14", "14.03.19, 08:30"])
+def test_a_german_date(date: str, dalembert: Dalembert) -> None:
+    rows = "0;{};1;5;40;;;\n1;15.3.2019;1;6;90;A;10;0\n"
+    head = "Lauf;Datum;Lager;Amplitude [mm/s];Phase [Grad];Ebene;Testmasse [g];Testwinkel [Grad]\n"
+    done = dalembert("field", "-", stdin=head + rows.format(date))
+    assert done.returncode == 0
+    assert "'Datum' as date" in done.stderr
+    wrong = dalembert("field", "-", stdin=head + rows.format("30.2.19"))
+    assert (wrong.returncode, wrong.stdout) == (1, "")
+    assert "row 1 (line 2), column Datum: found '30.2.19', expected a date" in wrong.stderr

@@ -339,12 +339,27 @@ def test_coefficients_of_a_lagging_phase_are_not_used_silently(
     assert LAGGING not in later("--rotation", "ccw")[1]
 
 
-def test_coefficients_of_a_leading_phase_need_no_word(dalembert: Dalembert) -> None:
+def test_coefficients_of_a_leading_phase_or_of_an_earlier_version(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
     dalembert("field", "-", "--save-influence", "c.csv", stdin=lagging_runs(2))
-    for options in ((), ("--phase-lag",)):
-        done = dalembert("field", "-", "--influence", "c.csv", *options, stdin=lagging_runs(1))
+    stored = (tmp_path / "c.csv").read_text().splitlines()
+    assert "phase_sense" not in stored[0]
+    (tmp_path / "said.csv").write_text(f"{stored[0]},phase_sense\n{stored[1]},lag\n")
+    unstated = "the file does not state that the phase lagged"
+    for file, options, warned in (
+        ("c.csv", (), False),
+        ("c.csv", ("--rotation", "ccw"), False),
+        ("c.csv", ("--phase-lag",), True),
+        ("c.csv", ("--rotation", "cw"), True),
+        ("c.csv", ("--phase-lag", "--rotation", "cw"), False),
+        ("said.csv", ("--phase-lag",), False),
+    ):
+        done = dalembert("field", "-", "--influence", file, *options, stdin=lagging_runs(1))
         assert done.returncode == 0
         assert LAGGING not in done.stderr
+        assert (f"warning: {file}: the phases of the runs were reversed" in done.stderr) is warned
+        assert (unstated in done.stderr) is warned
 
 
 def test_coefficients_at_speeds_for_runs_without_one(dalembert: Dalembert, tmp_path: Path) -> None:

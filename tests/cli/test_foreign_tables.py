@@ -86,20 +86,117 @@ def test_column_takes_a_foreign_name(dalembert: Dalembert) -> None:
         ("masse_g", "rayon_mm", "angle_deg"),
     ],
 )
-def test_synonyms_are_offered_and_never_taken(
+def test_words_of_other_languages_are_read_and_said(
     mass: str, radius: str, angle: str, dalembert: Dalembert
 ) -> None:
-    table = f"{mass};{radius};{angle}\n90,5;30;60\n60;50,25;210\n"
-    done = dalembert("balance", "-", *PLANE, stdin=table)
-    assert done.returncode == 1
-    assert len(done.stderr.splitlines()) == 1
-    offered = done.stderr.partition("did you mean ")[2].partition("?")[0]
-    assert "--column " in offered
-    import shlex
+    done = dalembert("balance", "-", *PLANE, stdin=f"{mass};{radius};{angle}\n90,5;30;60\n60;50,25;210\n")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+    foreign = {mass: "mass_g", radius: "radius_mm", angle: "angle_deg"}
+    for header, name in foreign.items():
+        english = header.lower().startswith(name.partition("_")[0] + " ") or header == name
+        assert (f"'{header}' as {name}" in done.stderr) is not english
 
-    taken = dalembert("balance", "-", *PLANE, *shlex.split(offered), stdin=table)
-    assert taken.returncode == 0, taken.stderr
-    assert taken.stdout == dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+
+def test_every_column_of_a_german_table_is_read(dalembert: Dalembert, tmp_path: Path) -> None:
+    planes = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")
+    german = "Läufer;Bezeichnung;Gewicht [N];Radius [mm];Winkellage [Grad];Abstand [mm]\n"
+    plain = "rotor;name;weight_N;radius_mm;angle_deg;z_mm\n"
+    rows = "A;W1;90,5;30;60;10\nA;W2;60;50,25;210;30\nB;W1;1;2;3;4\n"
+    done = dalembert("balance", "-", *planes, stdin=german + rows)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("balance", "-", *planes, stdin=plain + rows).stdout
+    (tmp_path / "planes.csv").write_text("Ebene;z [mm];Halbmesser [mm]\nA;0;20\nB;90;20\n")
+    again = dalembert("balance", "-", "--planes", "planes.csv", stdin=german + rows)
+    assert again.stdout == done.stdout
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("Masse [g];Gewicht [g];Radius [mm];Winkel [°]", "no column mass_kg"),  # two of one meaning
+        ("Masse [mm];Radius [mm];Winkel [°];Name", "--column mass_kg='Masse [mm]'"),
+        ("Masse;Radius [mm];Winkel [°];Name", "--column mass_kg=Masse"),
+        ("Masse [g];Radius [mm];Unwucht [g mm];Winkel [°]", "mixed columns Masse [g] and Unwucht [g mm]"),
+    ],
+)
+def test_a_foreign_header_that_is_not_plain_is_refused(
+    header: str, message: str, dalembert: Dalembert
+) -> None:
+    done = dalembert("balance", "-", *PLANE, stdin=f"{header}\n1;2;3;4\n")
+    assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (1, "", 1)
+    assert message in done.stderr
+
+
+def test_a_table_that_can_be_read_is_read_as_it_is(dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", *PLANE, stdin="mass_g;radius_mm;angle_deg;Abstand [mm]\n1;2;3;4\n")
+    assert done.stderr == (
+        "warning: standard input: ignored the column 'Abstand [mm]'; to read: --column z_mm='Abstand [mm]'\n"
+    )
+
+
+@pytest.mark.parametrize("header", ["Winkel [Grad];Drehmoment [Nm]", "Kurbelwinkel / Grad;Moment / N m"])
+def test_a_german_table_of_torque(header: str, dalembert: Dalembert) -> None:
+    options = ("--speed", "600rpm", "--fluctuation", "0.02")
+    rows = "0;10\n180;-10\n360;10\n"
+    done = dalembert("flywheel", "-", *options, stdin=f"{header}\n{rows}")
+    assert done.stdout == dalembert("flywheel", "-", *options, stdin=f"angle_deg;torque_N_m\n{rows}").stdout
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("header", "plain"),
+    [
+        ("Umschlagwinkel [Grad];Unwucht [g mm];Winkel [Grad]", "turned_deg;unbalance_g_mm;angle_deg"),
+        ("Drehwinkel [°];Schwingweg [µm];Phase [°]", "turned_deg;amplitude_um;phase_deg"),
+        ("turned_deg;Unwucht [g mm];Winkel [°]", "turned_deg;unbalance_g_mm;angle_deg"),
+    ],
+)
+def test_a_german_table_of_positions(header: str, plain: str, dalembert: Dalembert) -> None:
+    rows = "0;5,5;30\n180;4;100\n"
+    done = dalembert("index", "-", stdin=f"{header}\n{rows}")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("index", "-", stdin=f"{plain}\n{rows}").stdout
+
+
+def test_a_german_run_out(dalembert: Dalembert, tmp_path: Path) -> None:
+    runs = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,5,40,,,\n1,1,6,90,A,10,0\n"
+    (tmp_path / "plain.csv").write_text("sensor;amplitude_um;phase_deg\n1;0,5;30\n")
+    (tmp_path / "german.csv").write_text("Lager;Schwingweg [µm];Phase [Grad]\n1;0,5;30\n", encoding="utf-8")
+    german, plain = (
+        dalembert("field", "-", "--runout", f"{name}.csv", stdin=runs) for name in ("german", "plain")
+    )
+    assert german.returncode == 0, german.stderr
+    assert german.stdout == plain.stdout
+
+
+def test_a_recording_with_a_german_time(dalembert: Dalembert) -> None:
+    rows = "".join(f"{k};{int(k % 20 == 3)};{k % 20}\n" for k in range(100))
+    plain = dalembert("signal", "-", stdin=f"t_ms;mark;A_um\n{rows}")
+    assert plain.returncode == 0, plain.stderr
+    for time in ("Zeit [ms]", "time_ms"):
+        assert dalembert("signal", "-", stdin=f"{time};Mark;A [µm]\n{rows}").stdout == plain.stdout
+
+
+@pytest.mark.parametrize(
+    ("mass", "expected"),
+    [
+        ("1.010,5", "a number without marks between its thousands"),
+        ("1 010,5", "a number without marks between its thousands"),
+        ("1,010.5", "a number without marks between its thousands"),
+        ("1'010", "a number without marks between its thousands"),
+        ("1.010", "a number with a decimal comma, as elsewhere in the file"),  # 1010 or 1.01
+        ("10,5 g", "a number alone: its unit stands in the header"),
+        ("10.05.2024", "a number"),
+        ("", "a number"),
+    ],
+)
+def test_a_cell_that_is_no_number_among_decimal_commas(
+    mass: str, expected: str, dalembert: Dalembert
+) -> None:
+    done = dalembert("balance", "-", *PLANE, stdin=f"mass_g;radius_mm;angle_deg\n{mass};20,5;30\n")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.endswith(f"found '{mass}', expected {expected}\n")
 
 
 def test_a_column_that_may_be_meant_is_offered_in_the_remark(dalembert: Dalembert) -> None:
