@@ -53,7 +53,8 @@ class Rotors:
     mass_unit: str
     unbalance_unit: str
     radius_unit: str | None
-    weights: bool
+    weight_unit: str | None
+    """The unit of weights, in place of masses."""
 
     def exact(self, gravity: float) -> Vectors:
         """The unbalances of the decimals of the file, in 32 digits."""
@@ -64,7 +65,7 @@ class Rotors:
         sizes = amount.exact
         if "radius" in read and amount is not read.get("unbalance"):
             sizes = [size * radius for size, radius in zip(sizes, read["radius"].exact, strict=True)]
-        if self.weights:
+        if self.weight_unit:
             sizes = [size / written(gravity) for size in sizes]
         return vectors(sizes, read["angle"])
 
@@ -108,10 +109,10 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         size,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
-        column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
+        {"lbf": "lb"}.get(column.unit, "kg") if amount == "weight" else column.unit.split("_")[0],
         column.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
         radius_unit,
-        amount == "weight",
+        column.unit if amount == "weight" else None,
     )
 
 
