@@ -147,7 +147,7 @@ def sheet(b: Balancing) -> Page:
             planes,
             b.planes.radius[at],
             about,
-            request.gravity if rotors.weight_unit else None,
+            request.gravity if rotors.weights else None,
             bearings,
             request.remove,
             b.given_mass[here],

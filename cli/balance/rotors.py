@@ -53,8 +53,7 @@ class Rotors:
     mass_unit: str
     unbalance_unit: str
     radius_unit: str | None
-    weight_unit: str | None
-    """The unit of weights, in place of masses."""
+    weights: bool
 
     def exact(self, gravity: float) -> Vectors:
         """The unbalances of the decimals of the file, in 32 digits."""
@@ -65,7 +64,7 @@ class Rotors:
         sizes = amount.exact
         if "radius" in read and amount is not read.get("unbalance"):
             sizes = [size * radius for size, radius in zip(sizes, read["radius"].exact, strict=True)]
-        if self.weight_unit:
+        if self.weights:
             sizes = [size / written(gravity) for size in sizes]
         return vectors(sizes, read["angle"])
 
@@ -109,10 +108,10 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         size,
         phasor(size, angle.values, angle.unit),
         None if z is None else z.si,
-        {"lbf": "lb"}.get(column.unit, "kg") if amount == "weight" else column.unit.split("_")[0],
+        column.unit if amount == "mass" else "kg" if amount == "weight" else column.unit.split("_")[0],
         column.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
         radius_unit,
-        column.unit if amount == "weight" else None,
+        amount == "weight",
     )
 
 

@@ -108,8 +108,7 @@ def corrections(b: Balancing) -> Table:
     if b.request.mass_step is not None:
         unbalance.values = b.mass * _arms(radius, mass_unit, unit)
     unbalance.error = wrong("unbalance", unit)
-    weight = number("weight", "force", b.mass_kg * gravity, rotors.weight_unit or "N")
-    weight.error = wrong("force", rotors.weight_unit or "N", radius, gravity)
+    weight = number("weight", "force", b.mass_kg * gravity, error=wrong("force", "N", radius, gravity))
     mass, of_mass = read_number("mass", "mass", b.mass, mass_unit), wrong("mass", mass_unit, radius)
     mass.error = lambda: np.where(np.isnan(b.given_mass), of_mass(), 0.0)
     at = np.full(len(row), np.nan) if planes.z is None else planes.z[row]
@@ -121,7 +120,7 @@ def corrections(b: Balancing) -> Table:
         number("radius", "length", radius, rotors.radius_unit or planes.radius_unit),
         unbalance,
         mass,
-        *([weight] if rotors.weight_unit else []),
+        *([weight] if rotors.weights else []),
         number("angle", "angle", b.angle, error=turn),
     ]
     return Table(
@@ -129,7 +128,7 @@ def corrections(b: Balancing) -> Table:
         keys=("rotor", "plane"),
         place="rotors[].corrections[]",
         above=f"material to {'remove' if b.request.remove else 'add'}:",
-        documented=[*([z] if planes.z is None else []), *([] if rotors.weight_unit else [weight])],
+        documented=[*([z] if planes.z is None else []), *([] if rotors.weights else [weight])],
     )
 
 

@@ -28,19 +28,17 @@ SHOWN = 6
 
 
 class Scale:
-    """How the equations show an unbalance: as the document does, W·r (such as N·mm) where the table has weights."""
+    """How the equations show an unbalance: as the document does, W·r in N·mm where the table has weights."""
 
     def __init__(self, b: Balancing) -> None:
         unit = b.rotors.unbalance_unit
         self.length = b.length_unit
         self.letter = "m"
-        if weight := b.rotors.weight_unit:
+        if b.rotors.weights:
             self.letter = "W"
             length = self.length if self.length in ("mm", "m", "in") else "mm"
-            self.length, self.name = length, f"{weight}·{length}"
-            self.factor = float(from_si(b.request.gravity, "force", weight)) * float(
-                from_si(1.0, "length", length)
-            )
+            self.length, self.name = length, f"N·{length}"
+            self.factor = b.request.gravity * float(from_si(1.0, "length", length))
         else:
             self.name, self.factor = unit.replace("_", "·"), float(from_si(1.0, "unbalance", unit))
         self.reach = float(from_si(1.0, "length", self.length))
@@ -245,10 +243,9 @@ def _plane_topic(
     x, y = (value + 0.0 for value in (made.real, made.imag))
     q = quadrant(x, y)
     angle = degrees(made)
-    weight = b.rotors.weight_unit
     amount = (
-        f"W = {figures(float(from_si(mass * b.request.gravity, 'force', weight)))} {weight}"
-        if weight
+        f"W = {figures(mass * b.request.gravity)} N"
+        if b.rotors.weights
         else f"m = {figures(float(from_si(mass, 'mass', b.rotors.mass_unit)))} {b.rotors.mass_unit}"
     )
     length = b.length_unit
