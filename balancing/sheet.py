@@ -35,7 +35,6 @@ def machine_sheet(
     covariance: Complex | None = None,
     runout: Complex | None = None,
     against: bool = False,
-    first: str = "initial",
     amplitude_unit: str = "",
     mass: tuple[str, str] = ("mass", "kg"),
     channels: Sequence[tuple[str, float | None]] | None = None,
@@ -60,8 +59,6 @@ def machine_sheet(
         See `tapes.measured`.
     against : bool
         Whether typed phases are counted against the sense of the mass angles.
-    first : str
-        The name of the initial run.
     mass : (kind, unit)
         "mass" or "unbalance", and the unit it is shown in.
     channels : sequence of (sensor, speed)
@@ -91,8 +88,8 @@ def machine_sheet(
     for sensor, v in zip(sensors, initial, strict=True):
         # fifteen digits: a reading stands there as it was typed
         turned = float(f"{degrees(v.conjugate() if against else v):.15g}")
-        values[f"{first}/{sensor}/amplitude"] = float(f"{abs(v):.15g}")
-        values[f"{first}/{sensor}/phase"] = float(np.radians(turned))
+        values[f"initial/{sensor}/amplitude"] = float(f"{abs(v):.15g}")
+        values[f"initial/{sensor}/phase"] = float(np.radians(turned))
     kind, unit = mass
     coefficients = [
         [
@@ -111,7 +108,7 @@ def machine_sheet(
         for p, plane in enumerate(planes)
     ]
     whole: dict[str, Any] = {
-        "runs": [first, *(f"run {k + 1}" for k in range(1, RUNS))],
+        "runs": ["initial", *(f"run {k + 1}" for k in range(1, RUNS))],
         "sensors": list(sensors),
         "channels": [list(each) for each in channels or [(sensor, None) for sensor in sensors]],
         "speedUnit": speed_unit,

@@ -138,7 +138,9 @@ def once_per_turn(
         raise ValueError(f"the mark rises {len(knots)} time{'s' * (len(knots) != 1)}: expected {expected}")
     recording = time, x, level, pulses, None if tacho is None else np.asarray(tacho, dtype=float)
     if tacho is not None and pulses != 1:
-        raise ValueError("the pulses of a turn are counted from mark to mark, beside a tacho")
+        raise ValueError(
+            "the pulses of a turn are counted from mark to mark where there is a tacho: expected no pulses"
+        )
     return replace(_averaged(*recording), recording=recording)
 
 

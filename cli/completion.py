@@ -32,7 +32,9 @@ class Shell(StrEnum):
     fish = "fish"
 
 
-def run(shell: Annotated[Shell, typer.Argument(help="The shell that reads the script.")]) -> None:
+def run(
+    shell: Annotated[Shell, typer.Argument(metavar="SHELL", help="The shell: bash, zsh or fish.")],
+) -> None:
     """Print the completion script of a shell: source <(dalembert completion bash), in fish dalembert completion fish | source."""
     script = get_completion_script(prog_name="dalembert", complete_var=COMPLETE, shell=shell.value)
     if shell is Shell.bash:

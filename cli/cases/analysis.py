@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cli.cases.inputs import InputGrid, Inputs
-from cli.read.options import bad, whole
+from cli.read.options import bad, between_commas, whole
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.hints import nearest
@@ -70,7 +70,7 @@ def names(
     """Split names at the commas."""
     if text is None:
         return None
-    names = [name.strip() for name in text.split(",") if name.strip()]
+    names = between_commas(text)
     if not names:
         raise bad(flag, f"expected {example}")
     return names

@@ -427,9 +427,6 @@ def machine_page(b: FieldBalancing) -> Page:
         covariance=covariance,
         runout=b.runout(group)[0],
         against=bool(b.against(group)[0]),
-        first=next(
-            (run for run, bare in zip(group.lines.runs(0), group.bare[0], strict=True) if bare), "initial"
-        ),
         amplitude_unit=runs.amplitude_unit,
         mass=(runs.per, runs.mass_unit),
         channels=[(channel.sensor, channel.speed_written) for channel in group.channels],

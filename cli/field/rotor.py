@@ -436,7 +436,7 @@ class _Way:
         solved, i = self.solved, self.i
         corrections, residual = solved.corrections[i].tolist(), solved.residual[i].tolist()
         text = [f"  w_{plane} = {self._amount(w)}" for plane, w in zip(self.planes, corrections, strict=True)]
-        text.append("What is left, V0 + α·w:")
+        text.append("Residual vibration, V0 + α·w:")
         text += [
             f"  {channel}: {_text(v)} {self.unit}" for channel, v in zip(self.channels, residual, strict=True)
         ]

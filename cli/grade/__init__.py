@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.
-  answers ANSWERS  The file answers.csv with its column answer filled in; - is standard input.
+  answers ANSWERS  Table of the answers; - is standard input.
 What:
   key KEY.csv  Right answers of each student (default: key.csv in the folder of the answers).
 """
@@ -28,8 +28,8 @@ What:
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
 
-    ANSWERS has the columns student, quantity, answer, unit and those that name the row; further columns are kept. An
-    answer may have a decimal comma, a power of ten and its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle may differ by
+    ANSWERS is the answers.csv of dalembert exercise, with the column answer filled in. It has the columns student,
+    quantity, answer, unit and those that name the row; further columns are kept. An answer may have a decimal comma, a power of ten and its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle may differ by
     whole turns. The status is 0 however wrong the answers are.
     """
     from cli.exercise.description import read_exercise

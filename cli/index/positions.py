@@ -16,7 +16,7 @@ from balancing.runs.vectors import parted_cells
 from dalembert.angles import degrees, phasor
 from dalembert.decimals import Scaled
 from dalembert.errors import DataError, quote
-from dalembert.results.columns import Column, Table, apart, names, number
+from dalembert.results.columns import Column, Table, apart, listed, names, number
 from dalembert.results.way import Topic, figures, vector_text
 from dalembert.tables.table import Table as ReadTable
 from dalembert.tables.table import read
@@ -237,14 +237,13 @@ def way(p: Positions) -> list[Topic]:
     e = phasor(np.ones(len(p.turned)), p.turned, "deg")
     mean, turn = complex(read.mean()), complex(e.mean())
     spread = float((np.abs(e - turn) ** 2).sum())
-    unit = p.unit
     table = Table(
         [
-            Column("turned", "deg", p.turned, place="turned_deg"),
-            Column(p.quantity, unit, np.abs(read), place=p.quantity),
-            Column("angle", "deg", degrees(read), place="angle_deg"),
-            Column("x", unit, read.real, place="x"),
-            Column("y", unit, read.imag, place="y"),
+            number("turned", "angle", p.turned),
+            size(p, p.quantity, np.abs(p.readings), p.quantity),
+            number("angle", "angle", degrees(p.readings)),
+            size(p, "x", p.readings.real, "x"),
+            size(p, "y", p.readings.imag, "y"),
         ],
         ("turned_deg",),
         "readings[]",
@@ -258,10 +257,16 @@ def way(p: Positions) -> list[Topic]:
         f"rotor = Σ (e − ē)*·v/D = {vector_text(rotor)} {p.unit_text}: {figures(abs(rotor))} at {figures(degrees(rotor))}°",
         f"mandrel = v̄ − ē·rotor = {vector_text(mandrel)} {p.unit_text}: {figures(abs(mandrel))} at {figures(degrees(mandrel))}°",
     ]
-    head = {"unit": unit, "rotor": [rotor.real, rotor.imag], "mandrel": [mandrel.real, mandrel.imag]}
+    si = "_kg_m" if p.quantity == "unbalance" else ""
+    both = {"rotor": complex(p.parts.rotor), "mandrel": complex(p.parts.mounting)}
     return [
-        Topic("vectors", text, "Vectors of the readings", {"unit": unit}),
-        Topic("parts", numbers, "Rotor and mandrel", head),
+        Topic("vectors", text, "Vectors of the readings"),
+        Topic(
+            "parts",
+            numbers,
+            "Rotor and mandrel",
+            {f"{name}{si}": listed(part) for name, part in both.items()},
+        ),
     ]
 
 

@@ -241,8 +241,8 @@ Quantities:
 {ORDER}
 Drawn mechanisms:
   draws N  Number of mechanisms drawn at random within the tolerances.
-  seed N(0-)=0  With --draws: random seed.
-  distribution normal|uniform=normal  With --draws: normal (a limit is three standard deviations) or uniform (a limit is an end).
+  seed N(0-)  With --draws: random seed (default 0).
+  distribution normal|uniform  With --draws: normal (default; a limit is three standard deviations) or uniform (a limit is an end).
 """,
     example="tolerances",
 )
@@ -261,6 +261,8 @@ def tolerance(options: SimpleNamespace, show: ShowOptions) -> Result:
 
     if options.draws is not None and options.draws < 2:
         raise bad("--draws", f"{options.draws}: expected two or more drawn mechanisms")
+    if options.draws is None:
+        refuse("needs --draws", seed=options.seed is not None, distribution=options.distribution)
     cases = Cases.of(options)
     only = cases.request.only
     if only is not None and unknown(places(cases.mechanism, 3, only), only) is not None:
@@ -271,8 +273,8 @@ def tolerance(options: SimpleNamespace, show: ShowOptions) -> Result:
         cases,
         show,
         draws=options.draws or 0,
-        seed=options.seed,
-        distribution=options.distribution,
+        seed=options.seed or 0,
+        distribution=options.distribution or "normal",
         workers=workers,
     )
     return result(study, options)

@@ -82,7 +82,7 @@ def wanted(m: Mechanism, names: Sequence[str]) -> list[Wanted]:
     every = every_wanted(m)
     choices = {name: each for each in reversed(every) for name in each.names}
     result: list[Wanted] = []
-    for text in (part.strip() for name in names for part in name.split(",")):
+    for text in (part for name in names for part in options.between_commas(name) or [name]):
         if text not in choices:
             raise options.bad(
                 "--want", f"no point, link or slide is named '{text}'{hint(text, reversed(choices))}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
@@ -51,11 +52,24 @@ def refuse(message: str, **values: object) -> None:
         raise bad(flag, message)
 
 
+_NAME = re.compile(r'\s*(?:"([^"]*)")?([^,]*)')
+
+
+def between_commas(text: str) -> list[str]:
+    """Return the names between commas; a name with a comma of its own stands in quotes.
+
+    >>> between_commas('H.x, "B,2".y,"C,3"')
+    ['H.x', 'B,2.y', 'C,3']
+    """
+    names = ("".join(match.groups("")).strip() for match in _NAME.finditer(text))
+    return [name for name in names if name]
+
+
 def only(text: str | None, names: Sequence[str]) -> Sequence[str]:
     """Read --only: the names between commas, all of them where there is none."""
     if text is None:
         return names
-    words = [word.strip() for word in text.split(",") if word.strip()]
+    words = between_commas(text)
     for word in words or [text]:
         if word not in names:
             raise bad("--only", f"'{word}': expected {', '.join(names)}")

@@ -246,7 +246,7 @@ def tolerance_of(
             "expected --grade or --permissible for a tolerance, or --speed for their forces",
             bearings=bearings,
         )
-        refuse("is for a tolerance: expected --grade too", speed=speed, rotor_mass=rotor_mass)
+        refuse("this is for a tolerance: expected --grade too", speed=speed, rotor_mass=rotor_mass)
         return None
     standard = grade.strip().upper().removesuffix("-STD-167-1")
     value = 0.0

@@ -29,6 +29,7 @@ DASHES = ("-", "\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _QUOTED = re.compile(r'"[^"]*"')
 # rows from which importing pandas pays
 LARGE = 10_000
+OTHERS = {"<": "XML or HTML", "{": "JSON"}  # how files begin that are no tables
 SHOWN = 8  # hidden rows and percentages that a warning names
 
 
@@ -224,6 +225,9 @@ def source_of(
             warnings.append(f"{file}: read the sheet {quote(sheet.name)}; there are also {others}")
     else:
         text = decoded(file, data, warnings)
+        other = "TOML" if file.lower().endswith(".toml") else OTHERS.get(text.lstrip()[:1])
+        if other:
+            raise DataError(f"{file}: this is {other}: expected a table, as CSV or a workbook")
         source = Source(file, text, delimiter(text), warnings)
     first = list(islice(source.everything(), LOOKED_AT))
     if not first:

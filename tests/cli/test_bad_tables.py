@@ -260,3 +260,21 @@ def test_random_tables_never_break_the_command(
             contextlib.suppress(DataError),
         ):
             assert command.main(["balance", str(path), "--json", *planes], standalone_mode=False) in (0, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("klann.toml", '[units]\nlength = "mm"\n[ground]\nA = [0, 90]\n', "TOML"),
+        ("robot.urdf", '<robot name="r"><link name="arm"/></robot>\n', "XML or HTML"),
+        ("result.json", '{\n "rotors": []\n}\n', "JSON"),
+    ],
+)
+def test_a_file_of_another_kind_is_named(
+    name: str, text: str, kind: str, dalembert: Dalembert, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    for command in (["balance", name, "--plane", "A:1mm"], ["body", name], ["work", name]):
+        done = dalembert(*command)
+        line = f"dalembert: {name}: this is {kind}: expected a table, as CSV or a workbook\n"
+        assert (done.returncode, done.stdout, done.stderr) == (1, "", line)

@@ -11,6 +11,7 @@ import pytest
 
 from tests.cli.test_pages_of_rotors import PUMP
 from tests.cli.test_pages_that_compute import Computing
+from tests.computed_pages import script_and_data
 from tests.conftest import Dalembert
 
 
@@ -132,3 +133,16 @@ def test_the_keyboard_goes_on_where_rows_come_and_go(
     assert [remove(0), remove(1), remove(0)] == ["remove W2", "remove W2", "add a row"]
     assert page.get("A.unbalance") == 0
     assert page.faults() == []
+
+
+@pytest.mark.parametrize("first", ["0", "Lauf 1", "initial"])
+def test_the_initial_run_of_a_sheet_is_initial(first: str, dalembert: Dalembert, tmp_path: Path) -> None:
+    """A sheet is for the next readings: its entries have the same names whatever the log calls its runs."""
+    (tmp_path / "r.csv").write_text(
+        "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
+        f"{first},1,5,20,,,\ntrial,1,3,60,A,10,0\n"
+    )
+    assert dalembert("field", "r.csv", "--page", "f.html").returncode == 0
+    _, data = script_and_data((tmp_path / "f.html").read_text())
+    assert data["sheet"]["runs"] == ["initial", "run 2", "run 3", "run 4"]
+    assert data["sheet"]["values"] == {"initial/1/amplitude": 5, "initial/1/phase": math.radians(20)}

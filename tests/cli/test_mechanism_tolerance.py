@@ -123,6 +123,20 @@ def test_drawn_mechanisms_agree_with_the_first_order(dalembert, file):
     assert other["drawn"] != found["drawn"]
 
 
+@pytest.mark.parametrize("option", [("--seed", "0"), ("--seed", "5"), ("--distribution", "normal")])
+def test_options_of_draws_without_draws_are_refused(dalembert, file, option):
+    done = dalembert("tolerance", file(), *option)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"Invalid value for {option[0]}: needs --draws" in done.stderr
+    drawn = ("--draws", "20", "--at", "40", "--only", "C.x")
+    assert dalembert("tolerance", "m.toml", *drawn, *option).returncode == 0
+    if option[1] != "5":
+        assert (
+            dalembert("tolerance", "m.toml", *drawn, *option).stdout
+            == dalembert("tolerance", "m.toml", *drawn).stdout
+        )
+
+
 def test_near_a_limit_the_difference_is_said(dalembert, tmp_path):
     """A crank that just passes: coupler and rocker reach 100.02 mm beyond it where 100 are needed."""
     text = FILE.replace("[100, 0]", "[159.98, 0]")

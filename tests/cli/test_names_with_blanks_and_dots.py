@@ -1,4 +1,4 @@
-"""Links and points whose names have blanks, dots, ° or µ: the headers that are written can be read again."""
+"""Links and points whose names have blanks, dots, commas, ° or µ: the headers that are written can be read again."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import json
 
 import pytest
 
-NAMES = ["crank", "my crank", "crank 1.5", "µ-Kurbel", "crank 30°", "my_crank"]
+NAMES = ["crank", "my crank", "crank 1.5", "µ-Kurbel", "crank 30°", "my_crank", "crank, left", "7"]
 
 
 def arm(name, more=""):
@@ -22,18 +22,21 @@ def arm(name, more=""):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_columns_of_a_link_by_its_name(dalembert, tmp_path, name):
     (tmp_path / "arm.toml").write_text(arm(name))
-    (tmp_path / "c.csv").write_text(f"links.{name}.B.x_m,{name}_deg\n3,90\n")
-    found = dalembert("mechanism", "arm.toml", "--cases", "c.csv", "--only", f"B,{name}", "-o", "o.csv")
+    (tmp_path / "c.csv").write_text(f'"links.{name}.B.x_m","{name}_deg"\n3,90\n')
+    quoted = f'B,"{name}"'
+    found = dalembert("mechanism", "arm.toml", "--cases", "c.csv", "--only", quoted, "-o", "o.csv")
     assert (found.returncode, found.stderr) == (0, "")
     (row,) = csv.DictReader(io.StringIO((tmp_path / "o.csv").read_text()))
     assert float(row["B_y_m"]) == 3
     assert float(row[f"links.{name}.B.x_m"]) == 3
     # its own table is what it expects
     again = dalembert(
-        "mechanism", "arm.toml", "--cases", "c.csv", "--only", f"B,{name}", "--expect", "o.csv", "--json"
+        "mechanism", "arm.toml", "--cases", "c.csv", "--only", quoted, "--expect", "o.csv", "--json"
     )
     assert again.returncode == 0
     assert {cell["column"] for cell in json.loads(again.stdout)["check"]} >= {f"{name}_omega_rad_s"}
+    one = dalembert("mechanism", "arm.toml", "--only", f'"{name}".omega')
+    assert next(csv.reader([one.stdout.splitlines()[0]]))[2:] == [f"{name}_omega_rad_s"]
 
 
 def test_names_that_are_alike_but_for_a_blank(dalembert, tmp_path):
@@ -72,3 +75,13 @@ def test_an_end_that_is_not_there_is_named(dalembert, tmp_path):
         found = dalembert("forces", "arm.toml")
         assert (found.returncode, found.stdout) == (1, "")
         assert "[[springs]] 1 between" in found.stderr
+
+
+def test_a_target_at_a_point_whose_name_has_a_comma(dalembert, tmp_path):
+    (tmp_path / "arm.toml").write_text(arm("crank").replace('"P.x"', '"P, left"'))
+    (tmp_path / "t.csv").write_text('input_deg,"P, left_x_m","P, left_y_m"\n0,3,0\n90,0,3\n')
+    free = ("--free", "links.crank.P, left.x=1m:4m")
+    found = dalembert("fit", "arm.toml", "t.csv", "--want", '"P, left"', *free, "--json")
+    assert found.returncode == 0, found.stderr
+    assert json.loads(found.stdout)["fit"]["parameters"] == {"links.crank.P, left.x_m": pytest.approx(3)}
+    assert dalembert("fit", "arm.toml", "t.csv", "--want", "P, left", *free).returncode == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from itertools import pairwise
 from math import hypot
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,11 @@ def test_parts_add_up_and_roots_hold_the_pose_in_every_worked_example(
     for loop in topics.get("loops", {"loops": []})["loops"]:
         assert loop.endswith(" = 0")
         assert " − " in loop
+        # no step from a point to itself
+        ways = [part.split("→") for part in loop.removesuffix(" = 0").split(" − ")]
+        assert not any(a == b for names in ways for a, b in pairwise(names))
+    if name == "engine":
+        assert topics["loops"]["loops"] == ["O→A→B − O→B = 0"]
 
 
 def check_parts(points: Any, pose: Any) -> None:

@@ -103,8 +103,9 @@ def test_even_positions_have_no_mean(dalembert: Any, tmp_path: Path) -> None:
 def test_half_the_sum_and_half_the_difference(dalembert: Any, tmp_path: Path) -> None:
     (tmp_path / "i.csv").write_text("turned_deg,unbalance_g_mm,angle_deg\n0,5,0\n180,1,0\n")
     way = topics(dalembert, "index", "i.csv")
-    assert way["parts"]["rotor"] == pytest.approx([2, 0], abs=1e-12)
-    assert way["parts"]["mandrel"] == pytest.approx([3, 0], abs=1e-12)
+    assert way["parts"]["rotor_kg_m"] == pytest.approx([2e-6, 0], abs=1e-18)
+    assert way["parts"]["mandrel_kg_m"] == pytest.approx([3e-6, 0], abs=1e-18)
+    assert [row["unbalance_kg_m"] for row in way["vectors"]["readings"]] == [5e-6, 1e-6]
 
 
 def test_the_shares_of_cylinders_add_up(dalembert: Any, tmp_path: Path) -> None:

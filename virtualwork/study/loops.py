@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +33,11 @@ class Loop(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The loop as text: `A→B→C − A→D→C = 0` (Ibrahim eq. 1.3.1); ways of the same joints with their links."""
-        one, other = "→".join(self.one), "→".join(self.other)
+        """The loop as text: `A→B→C − A→D→C = 0` (Ibrahim eq. 1.3.1); ways of the same joints with their links.
+
+        A pin on the slider that it moves is one point: O→A→B − O→B = 0.
+        """
+        one, other = ("→".join(name for name, _ in groupby(way)) for way in (self.one, self.other))
         if one == other:
             one, other = f"{one} ({', '.join(self.along_one)})", f"{other} ({', '.join(self.along_other)})"
         return f"{one} − {other} = 0"
