@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cli.read.options import bad, time_range
+from cli.read.options import bad, refuse, time_range
 from cli.show.output import command
 
 if TYPE_CHECKING:

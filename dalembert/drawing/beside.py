@@ -26,7 +26,8 @@ def along(corners: ArrayLike) -> Real:
     pieces = [
         a + np.linspace(0, 1, 2 + int(np.hypot(*(b - a)) / 4))[:, None] * (b - a) for a, b in pairwise(ends)
     ]
-    return np.concatenate([ends[:1], *pieces])[1 if pieces else 0 :]
+    places: Real = np.concatenate([ends[:1], *pieces])
+    return places[1:] if pieces else places
 
 
 def around(middle: ArrayLike, radius: float) -> Real:
