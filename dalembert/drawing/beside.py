@@ -26,15 +26,15 @@ def along(corners: ArrayLike) -> Real:
     pieces = [
         a + np.linspace(0, 1, 2 + int(np.hypot(*(b - a)) / 4))[:, None] * (b - a) for a, b in pairwise(ends)
     ]
-    places: Real = np.concatenate([ends[:1], *pieces])
-    return places[1:] if pieces else places
+    return np.concatenate([ends[:1], *pieces])[1 if pieces else 0 :]
 
 
 def around(middle: ArrayLike, radius: float) -> Real:
     """Return pixels (33, 2) around a circle, and its middle."""
     angle = np.linspace(0, 2 * np.pi, 32)
     ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return np.asarray(middle, dtype=float) + np.concatenate([np.zeros((1, 2)), ring])
+    places: Real = np.asarray(middle, dtype=float) + np.concatenate([np.zeros((1, 2)), ring])
+    return places
 
 
 def beside(
