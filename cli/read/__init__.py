@@ -1,1 +1,1 @@
-"""What a user gives, turned into SI numbers: tables, units, option values, planes, parts."""
+"""What a user types, turned into numbers: options, planes and grades, the search for a number that is to be found."""
