@@ -36,8 +36,8 @@ AROUND = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1], [1, 0], [-1, 0], [0, -1],
 Real = NDArray[np.float64]
 
 
-def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
-    """Return the picture of one pose; None where it cannot be assembled.
+def svg(poses: Poses, drawing: Drawing) -> str | None:
+    """Return the picture of the first pose; None where it cannot be assembled.
 
     Colours are those of a page in the dark as in the light: what is no link has the colour of the text around.
 
@@ -50,7 +50,7 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
     order = list(poses.mechanism.bodies)
 
     def at(body: str, z: complex) -> complex:
-        return complex(poses.point(body, z)[i])
+        return complex(poses.point(body, z)[0])
 
     drawn = [(shape, standing(shape, at)) for shape in drawing.shapes]
     every = np.array([z for _, shape in drawn for z in shape.reach])
