@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.angles import phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_array, as_vectors, floats
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -67,8 +68,7 @@ def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> In
     >>> complex(both.rotor), complex(both.mounting)
     ((2+1j), (3+0j))
     """
-    read = np.asarray(readings, dtype=complex)
-    phi = np.asarray(turned, dtype=float)
+    read, phi = as_vectors(readings), as_array(turned)
     if phi.ndim != 1 or read.shape[-1:] != phi.shape:
         raise ValueError("expected as many readings as angles")
     if len(phi) < 2:
@@ -77,26 +77,29 @@ def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> In
         raise ValueError("readings and angles must be finite")
     # in degrees half a turn is exact
     turn = phasor(np.ones(len(phi)), np.degrees(phi), "deg")
-    mean = turn.mean()
+    mean = turn.sum(axis=-1) / len(phi)
     apart = turn - mean
-    if np.abs(apart).max() < 1e-6:
+    if np.abs(floats(apart)).max() < 1e-6:
         raise ValueError("the rotor was not turned: expected different angles")
-    size = float(np.square(np.abs(apart)).sum())
+    size = np.square(np.abs(apart)).sum(axis=-1)
     rotor = (read @ apart.conj()) / size
-    mounting = read.mean(axis=-1) - mean * rotor
+    mounting = read.sum(axis=-1) / len(phi) - mean * rotor
     residuals = read - (mounting[..., None] + rotor[..., None] * turn)
     # what the readings and the factor by which their errors grow leave of rounding
-    noise = 24 * EPS * len(phi) / size * (np.abs(read).sum(axis=-1) + len(phi) * np.abs(rotor))
-    rotor, mounting = (np.where(np.abs(part) > noise / len(phi), part, 0.0) for part in (rotor, mounting))
-    residuals = np.where(np.abs(residuals) > noise[..., None], residuals, 0.0)
+    sizes = np.abs(floats(read)).sum(axis=-1) + len(phi) * np.abs(floats(rotor))
+    noise = 24 * EPS * len(phi) / floats(size) * sizes
+    rotor, mounting = (
+        np.where(np.abs(floats(part)) > noise / len(phi), part, 0.0) for part in (rotor, mounting)
+    )
+    residuals = np.where(np.abs(floats(residuals)) > noise[..., None], residuals, 0.0)
     spare = len(phi) - 2
     square = np.square(np.abs(residuals)).sum(axis=-1)
-    variance = square / spare if spare else np.full_like(square, np.nan)
+    variance = square / spare if spare else square * np.nan
     return Indexed(
         rotor,
         mounting,
         residuals,
         np.sqrt(variance),
         np.sqrt(variance / size / 2),
-        np.asarray(np.sqrt(len(phi) / size)),
+        as_array(np.sqrt(len(phi) / size)),
     )

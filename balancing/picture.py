@@ -34,7 +34,6 @@ RIM_ROOM = 2.3
 SENSE = "angles counter-clockwise as seen against +z"
 WHOLE = Look("0.55", 4.0)
 TOGETHER = Look("tab:red", 1.8)
-READ = Look("tab:blue", 1.0)
 
 
 NONE = np.zeros(0, dtype=complex)

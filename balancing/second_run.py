@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from balancing.dependence import threshold
 from dalembert.arithmetic.doubled import Doubled
 from dalembert.arithmetic.doubled_arrays import Vectors
-from dalembert.arithmetic.doubled_functions import DOUBLED
 from dalembert.arithmetic.doubled_operations import part, total
 
 Real = NDArray[np.float64]
@@ -56,24 +55,6 @@ class ExactMasses(NamedTuple):
         lever = self.planes - part(about, (..., None))
         couple = self.about(part(about, (..., None)))[..., 0] + (made * lever).sum()
         return self.static + made.sum(), couple
-
-
-class ExactParts:
-    """Index balancing of readings (k,) with the rotor turned by e_k: as `balancing.indexing` has it, by least squares."""
-
-    def __init__(self, readings: Vectors, turn: Vectors) -> None:
-        rows = Vectors.joined([Vectors.of(np.ones((len(turn.x.high), 1))), turn[:, None]], axis=-1)
-        parts, left = smallest_squares(rows, -readings)
-        # rotor and mounting
-        self.parts, self.residuals = parts[::-1], -left
-        apart = turn - (turn.sum() / np.array(float(turn.shape[0])))[None]
-        self.size = total(apart.square)
-
-    @property
-    def uncertainty(self) -> Doubled:
-        """√(Σ|residual|²/(k − 2)/(2 D))."""
-        spare = float(2 * (self.residuals.shape[0] - 2))
-        return DOUBLED.sqrt(total(self.residuals.square) / (self.size * spare))
 
 
 def smallest_squares(a: Vectors, b: Vectors) -> tuple[Vectors, Vectors]:
@@ -210,64 +191,3 @@ def product(a: Vectors, b: Vectors) -> Vectors:
 def applied(a: Vectors, x: Vectors) -> Vectors:
     """Return A x, (..., m, n) and (..., n)."""
     return (a * x[..., None, :]).sum()
-
-
-def spline(x: Doubled, y: Doubled, z: Doubled) -> Doubled:
-    """Return the cubic splines through (x, y), (n,) and (k, n), at z (...): (k, ...); not-a-knot at both ends, as scipy's.
-
-    Of two stations a line, of three a parabola. C. de Boor, A Practical Guide to Splines (1978), ch. IV: the slopes solve a
-    tridiagonal system.
-
-    Examples
-    --------
-    >>> x = Doubled(np.arange(5.0))
-    >>> (spline(x, part(x * x * x, (None,)), Doubled(np.array([2.5])))).value
-    array([[15.625]])
-    """
-    n = len(x.high)
-    h = part(x, slice(1, None)) - part(x, slice(-1))
-    rise = (part(y, (..., slice(1, None))) - part(y, (..., slice(-1)))) / h
-    steps, rises = [part(h, k) for k in range(n - 1)], [part(rise, (..., k)) for k in range(n - 1)]
-    if n == 2:
-        slopes = [rises[0], rises[0]]
-    elif n == 3:
-        curve = (rises[1] - rises[0]) / (steps[0] + steps[1])
-        slopes = [rises[0] - curve * steps[0], rises[0] + curve * steps[0], rises[1] + curve * steps[1]]
-    else:
-        slopes = _slopes(steps, rises)
-    at = np.clip(np.searchsorted(x.high, np.ravel(z.high), side="right") - 1, 0, n - 2)
-    t, step = Doubled(np.ravel(z.high), np.ravel(z.low + 0.0 * z.high)) - part(x, at), part(h, at)
-    first, last = (
-        Doubled(
-            *(
-                np.stack([getattr(s, name) + 0.0 * s.high for s in slopes], axis=-1)[..., at + k]
-                for name in ("high", "low")
-            )
-        )
-        for k in (0, 1)
-    )
-    own = part(rise, (..., at))
-    cubic = (first + last - own * 2.0) / step
-    curve = (own - first) / step - cubic
-    value = part(y, (..., at)) + t * (first + t * (curve + t * cubic / step))
-    shape = (*value.high.shape[:-1], *np.shape(z.high))
-    return Doubled(value.high.reshape(shape), np.reshape(value.low, shape))
-
-
-def _slopes(h: list[Doubled], rise: list[Doubled]) -> list[Doubled]:
-    """Return the slopes at the stations: h_k s_{k-1} + 2(h_{k-1} + h_k) s_k + h_{k-1} s_{k+1} = 3(…), eliminated in order."""
-    both = h[0] + h[1]
-    diagonal, above = [h[1]], [both]
-    right = [(rise[0] * (h[0] + both * 2.0) * h[1] + rise[1] * h[0] * h[0]) / both]
-    for k in range(1, len(h)):
-        share = h[k] / diagonal[-1]
-        diagonal.append((h[k - 1] + h[k]) * 2.0 - share * above[-1])
-        right.append((rise[k - 1] * h[k] + rise[k] * h[k - 1]) * 3.0 - right[-1] * share)
-        above.append(h[k - 1])
-    both = h[-1] + h[-2]
-    share = both / diagonal[-1]
-    end = (rise[-1] * (h[-1] + both * 2.0) * h[-2] + rise[-2] * h[-1] * h[-1]) / both - right[-1] * share
-    slopes = [end / (h[-2] - share * above[-1])]
-    for r, d, a in zip(reversed(right), reversed(diagonal), reversed(above), strict=True):
-        slopes.append((r - slopes[-1] * a) / d)
-    return slopes[::-1]

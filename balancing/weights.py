@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import comb
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.placement import Placement, checked_positions
+from dalembert.arithmetic.shapes import in_32_digits, is_doubled
 
 if TYPE_CHECKING:
-    from dalembert.arithmetic.doubled import Doubled
-    from dalembert.arithmetic.doubled_arrays import Vectors
+    from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -282,89 +283,78 @@ def place_weights(target: complex, weights: ArrayLike) -> Placement:
         raise ValueError("expected weights, positive")
     if not np.isfinite(goal):
         raise ValueError("the target must be finite")
-    size, longest = abs(goal), int(masses.argmax())
-    whole, rest = float(masses.sum()), float(np.delete(masses, longest).sum())
-    toward = float(np.angle(goal)) if goal else 0.0
-    if size >= whole:
-        return Placement(goal, np.full(len(masses), toward), masses, size - whole)
-    if size <= masses[longest] - rest:
-        angles = np.where(np.arange(len(masses)) == longest, toward, toward + np.pi)
-        return Placement(goal, angles, masses, float(masses[longest] - rest - size))
-    arcs = _arcs(np.append(masses, size))[:-1]
-    return Placement(goal, toward + np.cumsum(arcs) - arcs / 2 - arcs.sum() / 2, masses)
+    angles, bound = _angles(float(np.angle(goal)) if goal else 0.0, masses, abs(goal), masses, abs(goal))
+    return Placement(goal, angles, masses, bound)
 
 
-def angles_again(placed: Placement, target: Vectors, weights: Doubled) -> Doubled:
+def angles_again(placed: Placement, target: Vectors, weights: DoubledArray) -> Any:
     """Return the angles (n,) of `place_weights` in 32 digits, rad; NaN where the polygon is so flat that they are not reached."""
-    from dalembert.arithmetic.doubled import PI, Doubled
-    from dalembert.arithmetic.doubled_operations import part, total
+    length, exact = abs(placed.target), cast("Any", target)
+    toward = np.arctan2(exact.imag, exact.real) if length else 0.0
+    return _angles(toward, weights, np.abs(exact), placed.masses, length)[0]
 
-    size, masses = abs(placed.target), placed.masses
-    toward = target[None].angle if size else Doubled(np.zeros(1))
-    ones = np.ones(len(masses))
+
+def _angles(toward: Any, weights: Any, size: Any, masses: Real, length: float) -> tuple[Any, float]:
+    """Return the angles (n,) of weights whose sum is of a size in a direction, and the least error.
+
+    Of floats or of numbers in 32 digits; `masses` and `length`, the floats of weights and size, decide.
+    """
     longest = int(masses.argmax())
     whole, rest = float(masses.sum()), float(np.delete(masses, longest).sum())
-    if size >= whole:
-        return toward + 0.0 * ones
-    if size <= masses[longest] - rest:
-        opposite = np.where(np.arange(len(masses)) == longest, 0.0, 1.0)
-        return toward + PI * opposite
-    goal = target.size
-    sides = Doubled(np.append(weights.high, goal.high), np.append(weights.low + 0 * ones, goal.low))
-    arcs = _arcs_again(sides, _arcs(np.append(masses, size)))
-    # the sum before each, exactly
-    before = [Doubled(0.0)]
-    for k in range(len(masses)):
-        before.append(before[-1] + part(arcs, k))
-    middles = [(before[k] + before[k + 1]) / 2.0 for k in range(len(masses))]
-    half = total(part(arcs, slice(len(masses)))) / 2.0
-    return toward + Doubled(np.array([x.high for x in middles]), np.array([x.low for x in middles])) - half
+    nothing = 0.0 * weights
+    if length >= whole:
+        return toward + nothing, length - whole
+    if length <= masses[longest] - rest:
+        opposite = nothing + (np.arange(len(masses)) != longest)
+        return toward + opposite * np.pi, float(masses[longest] - rest - length)
+    sides = np.concatenate([weights, np.stack([size])])
+    arcs = _arcs(sides, np.append(masses, length))[:-1]
+    return toward + np.cumsum(arcs) - arcs / 2 - arcs.sum(axis=-1) / 2, 0.0
 
 
-def _arcs_again(sides: Doubled, arcs: Real) -> Doubled:
-    """Return the arcs in 32 digits, by Newton's method from those in 16; NaN where it does not converge."""
-    from dalembert.arithmetic.doubled import PI, Doubled
-    from dalembert.arithmetic.doubled_functions import DOUBLED
-    from dalembert.arithmetic.doubled_operations import part, total
+def _arcs(sides: Any, lengths: Real) -> Any:
+    """Return the arcs of the sides of a polygon on a circle, rad; no side is as long as the others together.
 
-    longest = int(sides.high.argmax())
-    share = part(sides, np.delete(np.arange(len(arcs)), longest)) / part(sides, longest)
-    square = (1.0 - share) * (share + 1.0)
-    outside = float(np.arcsin(share.high).sum()) < np.pi / 2
-    own = (PI if outside else Doubled(0.0)) + (-0.5 if outside else 0.5) * float(arcs[longest])
-    last = np.inf
+    `lengths` are the floats of the sides.
+    """
+    longest = int(lengths.argmax())
+    others = np.arange(len(lengths)) != longest
+
+    def shares(sides: Any) -> tuple[Any, Any]:
+        """The others as shares of the longest, and √(1 - share²)."""
+        share = sides[others] / sides[longest]
+        return share, np.sqrt((1 - share) * (1 + share))
+
+    def halves(own: Any, share: Any, slope: Any) -> Any:
+        """Half the arcs of the others, asin(share sin own), of half the arc of the longest: exact near a quarter turn too."""
+        return np.arctan2(share * np.sin(own), np.hypot(np.cos(own), slope * np.sin(own)))
+
+    decided, exact = shares(lengths), shares(sides)
+    # with the longest side as the diameter the others take less than half a turn: the centre lies outside
+    outside = float(halves(np.pi / 2, *decided).sum()) < np.pi / 2
+    low, own = 0.0, np.pi / 2
+    while low < (middle := (low + own) / 2) < own:
+        whole = float(halves(middle, *decided).sum())
+        beyond = middle > whole if outside else middle + whole > np.pi
+        low, own = (low, middle) if beyond else (middle, own)
+    if is_doubled(sides):
+        own = _refined(own, lambda own: halves(own, *exact), outside)
+    arcs = np.zeros_like(sides)
+    arcs[others], arcs[longest] = 2 * halves(own, *exact), 2 * (np.pi - own if outside else own)
+    return arcs
+
+
+def _refined(start: float, halves: Callable[[Any], Any], outside: bool) -> Any:
+    """Return half the arc of the longest side in 32 digits, by Newton's method; NaN where it does not converge."""
+    own, last = in_32_digits(start), np.inf
     for _ in range(60):
-        sine, cosine = DOUBLED.sincos(own)
-        rest = DOUBLED.sqrt(cosine * cosine + square * sine * sine)
-        halves = DOUBLED.atan2(share * sine, rest)
-        slope = float((share.high * cosine.high / rest.high).sum())
-        miss = total(halves) + (-own if outside else own - PI)
-        step = float(miss.value) / (slope + (-1 if outside else 1))
+        half = halves(own)
+        miss = float(half.sum() + (-own if outside else own - np.pi))
+        slope = float((np.tan(half.high) / np.tan(own.high)).sum())
+        step = miss / (slope + (-1 if outside else 1))
         if abs(step) <= 1e-30 or (abs(step) >= last / 2 and last < 1e-22):
-            every = (PI - own if outside else own) * 2.0
-            parts = ((halves.high * 2, every.high), (halves.low * 2, every.low))
-            return Doubled(*(np.insert(of_others, longest, of_longest) for of_others, of_longest in parts))
+            return own
         if not abs(step) < last:
             break
-        own, last = own - step, abs(step)
-    return Doubled(np.full(len(arcs), np.nan))
-
-
-def _arcs(sides: Real) -> Real:
-    """Return the arcs of the sides of a polygon on a circle, rad; no side is as long as the others together."""
-    longest = int(sides.argmax())
-    share = np.delete(sides, longest) / sides[longest]
-    slope = np.sqrt((1 - share) * (1 + share))
-
-    def halves(own: float) -> Real:
-        """Half the arcs of the others, asin(share sin own), of half the arc of the longest: exact near a quarter turn too."""
-        return np.asarray(np.arctan2(share * np.sin(own), np.hypot(np.cos(own), slope * np.sin(own))))
-
-    # with the longest side as the diameter the others take less than half a turn: the centre lies outside
-    outside = float(halves(np.pi / 2).sum()) < np.pi / 2
-    low, high = 0.0, np.pi / 2
-    while low < (middle := (low + high) / 2) < high:
-        others = float(halves(middle).sum())
-        beyond = middle > others if outside else middle + others > np.pi
-        low, high = (low, middle) if beyond else (middle, high)
-    return np.asarray(np.insert(2 * halves(high), longest, 2 * (np.pi - high if outside else high)))
+        own, last = own - np.array(step), abs(step)
+    return in_32_digits(np.nan)

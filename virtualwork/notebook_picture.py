@@ -37,12 +37,11 @@ Real = NDArray[np.float64]
 def svg(
     poses: Poses,
     drawing: Drawing,
-    i: int = 0,
     *,
     most: tuple[float, float] = (520.0, 360.0),
     letters: float = 12.0,
 ) -> str | None:
-    """Return the picture of one pose, `most` pixels wide and high, its names in `letters` of so many; None where it cannot be assembled.
+    """Return the picture of the first pose, `most` pixels wide and high, its names in `letters` of so many; None where it cannot be assembled.
 
     Colours are those of a page in the dark as in the light: what is no link has the colour of the text around.
 
@@ -55,7 +54,7 @@ def svg(
     order = list(poses.mechanism.bodies)
 
     def at(body: str, z: complex) -> complex:
-        return complex(poses.point(body, z)[i])
+        return complex(poses.point(body, z)[0])
 
     drawn = [(shape, standing(shape, at)) for shape in drawing.shapes]
     every = np.array([z for _, shape in drawn for z in shape.reach])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from dalembert.tables.table import read
 from dalembert.units import parted
 
 if TYPE_CHECKING:
-    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.arithmetic.doubled_arrays import DoubledArray
 
 Real = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Modes:
     rigid: bool
     """Whether force and couple are to vanish too."""
     warnings: list[str]
-    exact: Callable[[], tuple[Doubled, Doubled]]
+    exact: Callable[[], tuple[DoubledArray, DoubledArray]]
     """Stations and shapes in 32 digits, as the file has them."""
 
     @property
@@ -67,24 +67,17 @@ class Modes:
         arm = (z - middle) / length
         return np.concatenate([np.ones_like(arm)[..., None, :], arm[..., None, :], shapes], axis=-2)
 
-    def exactly_at(self, z: Doubled) -> Doubled:
+    def exactly_at(self, z: DoubledArray) -> DoubledArray:
         """Return the same rows in 32 digits."""
-        from balancing.second_run import spline
-        from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_operations import part
+        from dalembert.arithmetic.doubled_splines import Spline
 
         x, y = self.exact()
-        rows = spline(x, y, z)
-        parts = [part(rows, k) for k in range(len(self.names))]
+        rows = [Spline(x, shape).at(z) for shape in y]
         if self.rigid:
-            first, last = part(x, 0), part(x, -1)
-            parts = [Doubled(np.ones(z.high.shape)), (z - (first + last) / 2.0) / (last - first), *parts]
-        return Doubled(
-            *(
-                np.stack([getattr(row, name) + 0.0 * row.high for row in parts], axis=-2)
-                for name in ("high", "low")
-            )
-        )
+            arm: Any = (z - (x[0] + x[-1]) / 2.0) / (x[-1] - x[0])
+            rows = [arm * 0.0 + 1.0, arm, *rows]
+        stacked: Any = np.stack
+        return stacked(rows, axis=-2)  # type: ignore[no-any-return]
 
     def unreached(self, error: UnreachedMode) -> str:
         """Say on which conditions the planes do not act."""
@@ -127,15 +120,15 @@ def read_modes(path: str, count: int | None, rigid: bool) -> Modes:
     if len(stations) < 2:
         raise DataError(f"{table.file}: one station along the shaft: expected two at least")
 
-    def exact() -> tuple[Doubled, Doubled]:
-        from dalembert.arithmetic.doubled_operations import doubled_array
+    def exact() -> tuple[DoubledArray, DoubledArray]:
+        from dalembert.arithmetic.doubled_fractions import exactly
 
         places, values = table.numbers["z"].exact, table.numbers["shape"].exact
         there = dict(zip(at.tolist(), places, strict=True))
         of = {(k, j): values[i] for i, (k, j) in enumerate(zip(code.tolist(), at.tolist(), strict=True))}
         every = [of[k, j] for k in range(len(names)) for j in range(len(stations))]
-        x = doubled_array([there[j] for j in range(len(stations))], stations.shape)
-        return x, doubled_array(every, shapes.shape)
+        x = exactly([there[j] for j in range(len(stations))], stations.shape)
+        return x, exactly(every, shapes.shape)
 
     return Modes(table.file, names, stations, shapes, rigid, table.warnings, exact)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -372,7 +372,7 @@ class Balancing:
 
         from balancing.second_run import ExactMasses, least_norm
         from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_arrays import Vectors
+        from dalembert.arithmetic.doubled_arrays import DoubledArray, Vectors
         from dalembert.arithmetic.doubled_operations import doubled_array, part
         from dalembert.tables.exact import writtens
 
@@ -392,9 +392,9 @@ class Balancing:
                 continue
             # where there is no mass any place will do
             at.high[masses < 0], at.low[masses < 0] = modes.z[0], 0.0
-            modal = (moment[masses][..., None, :] * modes.exactly_at(at)).sum()
-            shapes = modes.exactly_at(there)
-            result[rows] = least_norm(Vectors(shapes, shapes * 0.0), modal)
+            modal = (moment[masses][..., None, :] * modes.exactly_at(DoubledArray.of(at))).sum()
+            shapes: Any = modes.exactly_at(DoubledArray.of(there))
+            result[rows] = least_norm(Vectors.of_parts(shapes, shapes * 0.0), modal)
         return result
 
 

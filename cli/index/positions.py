@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,6 @@ from dalembert.units import from_si, to_si, written
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing.second_run import ExactParts
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.arithmetic.doubled_arrays import Vectors
 
@@ -47,16 +46,19 @@ class Positions:
     phase_lag: bool
 
     @cached_property
-    def exact(self) -> ExactParts:
+    def exact(self) -> Any:
         """The parts in 32 digits, with the decimals of the file exact."""
-        from balancing.second_run import ExactParts
-        from dalembert.tables.exact import turns, vectors
+        from dalembert.tables.exact import column, vectors
 
         numbers = self.table.numbers
         size, angle = numbers[self.quantity], numbers["angle" if self.quantity == "unbalance" else "phase"]
         sizes = size.exact if self.quantity == "unbalance" else size.decimals
         read = vectors(sizes, angle)
-        return ExactParts(read.conj() if self.phase_lag else read, turns(numbers["turned"]))
+        exact: Any = (
+            read.conj() if self.phase_lag else read,
+            column(numbers["turned"], range(len(self.turned))),
+        )
+        return index_balancing(*exact)
 
     def shown(self, value: Scaled) -> Scaled:
         """Return a value in the unit of the file."""
@@ -163,7 +165,8 @@ def parts(p: Positions) -> Table:
     both = np.array([complex(p.parts.rotor), complex(p.parts.mounting)])
 
     def exact() -> Vectors:
-        return p.exact.parts
+        both: Any = np.stack([p.exact.rotor, p.exact.mounting])
+        return both  # type: ignore[no-any-return]
 
     columns = [
         names("part", ["rotor", "mandrel"], None),

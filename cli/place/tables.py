@@ -231,7 +231,7 @@ class SecondRun:
         request = self.request
         if request.weights is not None:
             masses = writtens(request.weights)
-            return masses, angles_again(share.placed, goal, masses) * 180.0 / PI
+            return masses, angles_again(share.placed, goal, DoubledArray.of(masses)).doubled * 180.0 / PI
         if request.places is None:
             return goal.size * np.ones(1), goal[None].degrees
         places = request.exact_places()

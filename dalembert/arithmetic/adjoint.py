@@ -66,14 +66,13 @@ def _adjoints(tape: Tape, values: list[Number], output: int) -> dict[str, Number
     return adjoints
 
 
-def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) -> Tape:
+def derivatives(tape: Tape, to: Iterable[str]) -> Tape:
     """The tape of exact derivatives of outputs to inputs.
 
     Parameters
     ----------
     tape : Tape
     to : names of inputs
-    of : names of outputs; default: all
 
     Returns
     -------
@@ -106,7 +105,7 @@ def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) 
         if variable not in tape.inputs:
             raise KeyError(variable)
     results: dict[str, Number] = {}
-    for name in tape.names if of is None else of:
+    for name in tape.names:
         bar = _adjoints(tape, values, outputs[name])
         results |= {f"d({name})/d({variable})": bar.get(variable, 0.0) for variable in wanted}
     return recorder.tape(results)

@@ -11,12 +11,9 @@ from math import frexp
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dalembert.arithmetic.exact import halves
 from dalembert.arithmetic.recorded import RECORDED, Real
-
-Array = NDArray[np.float64]
 
 
 class Doubled:

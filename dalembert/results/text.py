@@ -12,7 +12,7 @@ from dalembert.results.columns import Column, Table
 from dalembert.units import written
 
 if TYPE_CHECKING:
-    from dalembert.results.columns import Cell, Document, Json, Values
+    from dalembert.results.columns import Document, Json, Values
 
 GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
 """Verdicts, as they stand in cells and sentences."""
@@ -165,11 +165,6 @@ def angle_text(degrees: float, spec: str) -> str:
 def paragraphs(*parts: str) -> str:
     """Join what is not empty with a blank line between."""
     return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
-
-
-def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
-    """Return rows as columns."""
-    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
 def with_uncertainty(value: float, uncertainty: float | None) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mpmath as mp
 import numpy as np
 import pytest
 
 from dalembert.angles import phasor
 from dalembert.arithmetic.doubled_arrays import DoubledArray
+from dalembert.arithmetic.shapes import floats, in_32_digits
 
 
 def exact(x: DoubledArray) -> list[mp.mpf]:
@@ -109,3 +112,36 @@ def test_complex_numbers() -> None:
     quarter = phasor(DoubledArray([2.0]), DoubledArray([450.0]), "deg")
     assert quarter.real.value == 0
     assert quarter.imag.value == 2
+
+
+def test_formulas_of_complex_arrays_run_as_on_floats() -> None:
+    rng = np.random.default_rng(5)
+    a, b = (rng.normal(size=(2, 3, n)) + 1j * rng.normal(size=(2, 3, n)) for n in (4, 5))
+    x, left = rng.normal(size=(2, 4)) + 0j, rng.random((2, 3)) > 0.5
+    weight = rng.random((2, 3))
+
+    def formulas(a: Any, b: Any, x: Any, weight: Any) -> list[Any]:
+        rows = np.concatenate([np.ones((2, 3, 1), dtype=complex), weight[..., None] * a], axis=-1)
+        return [
+            rows,
+            np.swapaxes(a, -1, -2).conj() @ b,
+            np.matvec(a, x) - 1j * weight,
+            np.einsum("...ij,...ik->...jk", a, b),
+            np.where(left, b[..., 0], 0.0),
+            np.abs(b.sum(axis=-1) / (2.0 + a[..., 0])),
+            np.linalg.norm(b, axis=-2),
+            np.stack([b.real, b.imag]).sum(axis=(-2, -1)),
+            np.isfinite(a) + 0.0,
+        ]
+
+    exact = formulas(*map(in_32_digits, (a, b, x, weight)))
+    for own, other in zip(formulas(a, b, x, weight), exact, strict=True):
+        assert np.shape(own) == np.shape(other)
+        assert np.abs(floats(other) - own).max() <= 1e-14 * np.abs(own).max()
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 5, 8])
+def test_sums_along_any_axis(n: int) -> None:
+    x = np.random.default_rng(n).normal(size=(3, n, 2))
+    for axis in (-1, -2, 0, (-2, -1)):
+        assert np.abs(DoubledArray(x, 1e-17 * x).sum(axis).value - x.sum(axis=axis)).max(initial=0.0) <= 1e-14

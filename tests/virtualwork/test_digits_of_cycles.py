@@ -11,9 +11,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from dalembert.arithmetic.doubled_arrays import DoubledArray
+from dalembert.arithmetic.doubled_splines import Spline
 from tests.virtualwork.judged import judge
 from virtualwork import Cycle, Guess, Guide, Input, Link, Mechanism, Torque
-from virtualwork.digits.cycle import Spline
 
 SPEED = 7.0
 
@@ -152,6 +152,7 @@ def test_the_spline_is_that_of_scipy(n: int, periodic: bool) -> None:
     own = Spline(DoubledArray(x), DoubledArray(y), periodic)
     other = CubicSpline(x, y, bc_type="periodic" if periodic else "not-a-knot")
     for at in (x[0], 0.7 * x[0] + 0.3 * x[-1], x[-1]):
+        assert float(own.at(at).value) == pytest.approx(float(other(at)), abs=1e-13)
         assert float(own.up_to(at).value) == pytest.approx(float(other.integrate(x[0], at)), abs=1e-13)
     back = Spline(DoubledArray(x[::-1]), DoubledArray(y[::-1]), periodic)
     assert float(back.up_to(x[0])) == pytest.approx(-float(other.integrate(x[0], x[-1])), abs=1e-13)

@@ -23,10 +23,10 @@ def wrong(where: str, value: Any, expected: str) -> DescriptionError:
     return DescriptionError(f"{where}: found {shown}, expected {expected}")
 
 
-def text_of(value: Any, where: str, expected: str = "text") -> str:
+def text_of(value: Any, where: str) -> str:
     """Return a text of the file, or a bare number as a text: names may be numbers."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise wrong(where, value, expected)
+        raise wrong(where, value, "text")
     return str(value)
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from decimal import Context, Decimal, localcontext
 from functools import cached_property
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
 from dalembert.arithmetic.doubled_arrays import DoubledArray
+from dalembert.arithmetic.doubled_splines import Spline
 from dalembert.arithmetic.engines.doubled import TURN
 from dalembert.arithmetic.guard import guarded
-from dalembert.arithmetic.splines import DIGITS, periodic, rates, sums
 from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.forces import Effort
@@ -103,45 +101,3 @@ class CycleRun:
     def off(self, exact: Any, value: float, more: Reals | None = None) -> float:
         """How far a number is from that in 32 digits; `more` than this the poses may be off, (n,)."""
         return float(exact.off(value)) + (0.0 if more is None else self.most(more))
-
-
-class Spline:
-    """The cubic spline through values at rising or falling places, (n,) each, as scipy's `CubicSpline` is one."""
-
-    def __init__(self, place: DoubledArray, values: DoubledArray, is_periodic: bool = False) -> None:
-        self.places = place.high
-        x, y = (sums(of.high.tolist(), of.low.tolist()) for of in (place, values))
-        self.place, self.values = x, y
-        with localcontext(Context(prec=DIGITS)):
-            # its second derivatives
-            if is_periodic:
-                self.bends = periodic(x, y)
-                self.bends.append(self.bends[0])
-            elif len(x) > 3:
-                _, self.bends = rates(x, y)
-            else:
-                # a parabola, or a straight line
-                first, last = ((y[k + 1] - y[k]) / (x[k + 1] - x[k]) for k in (0, len(x) - 2))
-                self.bends = [2 * (last - first) / (x[-1] - x[0])] * len(x)
-            steps = range(len(x) - 1)
-            self.integrals = [*accumulate((self._within(i, x[i + 1]) for i in steps), initial=Decimal(0))]
-
-    def _within(self, i: int, at: Decimal) -> Decimal:
-        """The integral from a place to one within the step behind it."""
-        h, t = self.place[i + 1] - self.place[i], at - self.place[i]
-        y, bend, further = self.values[i], self.bends[i], self.bends[i + 1]
-        slope = (self.values[i + 1] - y) / h - h * (2 * bend + further) / 6
-        return t * (y + t * (slope / 2 + t * (bend / 6 + t * (further - bend) / (24 * h))))
-
-    def up_to(self, at: float) -> DoubledArray:
-        """The integral from the first place to another one, of which the last float is the last place."""
-        with localcontext(Context(prec=DIGITS)):
-            if at == self.places[-1]:
-                total = self.integrals[-1]
-            else:
-                way = -1 if self.places[-1] < self.places[0] else 1
-                i = int(
-                    np.clip(np.searchsorted(way * self.places, way * at, "right") - 1, 0, len(self.place) - 2)
-                )
-                total = self.integrals[i] + self._within(i, Decimal(at))
-            return DoubledArray(float(total), float(total - Decimal(float(total))))

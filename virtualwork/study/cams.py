@@ -161,16 +161,13 @@ class LiftOff:
     at: float
 
 
-def lift_off(assembly: Assembly, cam: int, span: tuple[float, float] | None = None) -> LiftOff | None:
+def lift_off(assembly: Assembly, cam: int) -> LiftOff | None:
     """The speed of the one turning input from which on a cam would have to pull its follower.
 
     At constant speed the contact force is N₀ + N₁ω + N₂ω² at every pose: weight and springs, dampers, inertia. It is taken
     apart at speeds as large as the answer, where its parts are of one size.
 
-    Parameters
-    ----------
-    span : (low, high), optional
-        Of the input, rad. Default: one turn.
+    One turn of it is looked through.
 
     Returns
     -------
@@ -179,8 +176,7 @@ def lift_off(assembly: Assembly, cam: int, span: tuple[float, float] | None = No
     m = assembly.mechanism
     if m.friction or len(m.inputs) != 1 or m.inputs[0].is_slide:
         return None
-    low, high = span or (m.at[0], m.at[0] + TURN)
-    q = np.linspace(low, high, SAMPLES + 1)
+    q = np.linspace(m.at[0], m.at[0] + TURN, SAMPLES + 1)
 
     def contact(at: Reals, speed: float) -> Reals:
         poses = Lanes(assembly, at, speed, 0.0)
