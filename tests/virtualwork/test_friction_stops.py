@@ -1,6 +1,6 @@
 """What dry friction stops stands: blocks, inclines, flywheels and several rubbing joints against closed forms.
 
-Friction takes energy and never gives any: every run is asked for it by the product itself (`intime.gains`), and here.
+Friction takes energy and never gives any: every run is asked for it by the product itself (`intime.sticking.gains`), and here.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from scipy.integrate import solve_ivp
 from tests.virtualwork.released import G, block, double_pendulum, four_bar
 from virtualwork import Force, Friction, Guide, Input, Link, Mechanism, Spring, Torque
 from virtualwork.intime.friction import Rubbing
-from virtualwork.intime.gains import gains
 from virtualwork.intime.run import Run
+from virtualwork.intime.sticking import gains
 
 Exact = Callable[[float], Sequence[float]]
 

@@ -16,10 +16,9 @@ from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
 from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
-from virtualwork.intime.gains import gains
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import Method, Path, followed
-from virtualwork.intime.sticking import holding, rests
+from virtualwork.intime.sticking import gains, holding, rests
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
 
