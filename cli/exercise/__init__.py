@@ -35,7 +35,6 @@ What:
   page  Put a page that computes on each sheet. It is for practice: it shows the answers.
   system --for prairielearn|numbas...  Write the questions for this system too; repeatable.
 """
-SYSTEMS = ("prairielearn", "numbas")
 MOST = 2000
 
 
@@ -73,8 +72,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     if not options.folder:
         raise bad("-o", "expected -o FOLDER, where the sheets go")
     for name in options.system or ():
-        if name not in SYSTEMS:
-            raise bad("--for", f"'{name}': expected {' or '.join(SYSTEMS)}; moodle.xml is always written")
+        if name not in questions.SYSTEMS:
+            expected = " or ".join(questions.SYSTEMS)
+            raise bad("--for", f"'{name}': expected {expected}; moodle.xml is always written")
     exercise = read_exercise(options.file)
     if options.page and "--page" not in options_of(exercise.command[0]):
         raise bad("--page", f"found an exercise on {exercise.command[0]}, which has no page")

@@ -220,7 +220,9 @@ def key_table(exercise: Exercise, students: Sequence[Student], variants: Sequenc
         names("answer", [written(answer.value, answer.ask.figures) for answer in answers]),
         names("value", [answer.value for answer in answers]),
         names("figures", [answer.ask.figures for answer in answers]),
-        names("points", [int(each) if each.is_integer() else each for each in points]),
+        Column(
+            "points", "", [int(x) if x.is_integer() else x for x in points], place="points", stored=points
+        ),
         *(
             Column(draw.name, "", [str(variant.drawn[draw.name]) for _, variant, _ in rows])
             for draw in exercise.draws

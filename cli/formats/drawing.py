@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -15,8 +15,10 @@ import numpy as np
 from cli.formats.drawn import Body
 from cli.formats.markup import add, digits, document
 from cli.read.options import bad
+from dalembert.angles import read_degrees
 from dalembert.errors import DataError
 from dalembert.hints import nearest
+from dalembert.results.columns import Column, Table, number
 from dalembert.results.text import csv_text
 from dalembert.units import UNITS, to_si
 from virtualwork.describe.cams import CamDrive
@@ -281,20 +283,22 @@ def unit_of(bare: Mapping[str, str], suffix: str) -> tuple[str, float]:
     return (length, to_si(1.0, "length", length)) if held else ("m", 1.0)
 
 
-def curves(travel: Travel, length: str, metres: float, angle: str) -> bytes:
-    """Return the table of the input and of every moving point over its travel."""
-    m = travel.m
+def curves(travel: Travel, length: str, angle: str) -> bytes:
+    """Return the table of the input and of every moving point over its travel, in units of length and angle."""
     if travel.motion is None:
         raise DataError("curves need one input, and it has several: use `dalembert mechanism --cases`")
-    q = travel.motion.inputs[:, 0]
-    if m.inputs[0].is_slide:
-        columns = {f"input_{length}": q / metres}
-    else:
-        columns = {"input_rad": q} if angle == "rad" else {"input_deg": np.degrees(q)}
+    q, slides = travel.motion.inputs[:, 0], travel.m.inputs[0].is_slide
+    columns = [number("input", "length", q, length) if slides else _angle("input", q, angle)]
     for name in travel.moving:
-        for k, axis in enumerate("xy"):
-            columns[f"{name}_{axis}_{length}"] = travel.curve(name)[:, k] / metres
-    return csv_text({name: values.tolist() for name, values in columns.items()}).encode()
+        place = travel.curve(name)
+        columns += [number(f"{name}_{axis}", "length", place[:, k], length) for k, axis in enumerate("xy")]
+    return csv_text(Table(columns).cells).encode()
+
+
+def _angle(name: str, radians: Array, unit: str) -> Column:
+    if unit == "rad":
+        return Column(name, unit, radians)
+    return number(name, "angle", list(map(read_degrees, radians.tolist())), unit)
 
 
 def of_follower(m: Description, name: str) -> CamDrive:
@@ -323,7 +327,7 @@ def cam_bytes(
     length, metres = unit_of(bare, suffix)
     notes = check_cam(m, drive.number).warnings
     if suffix == ".csv":
-        return _profile_table(points, drive, length, metres, bare.get("angle", "rad")), notes
+        return _profile_table(points, drive, length, bare.get("angle", "rad")), notes
     comment = " ".join(f"{m.name}: profile of {drive.label}, from {file}".split())
     center = m.bodies[drive.cam.cam][drive.pin] / metres
     strokes = _profile(points, length, metres, center, drive.cam.base_radius / metres)
@@ -346,26 +350,24 @@ def _profile(
     return Strokes(length, list(shapes))
 
 
-def _profile_table(
-    points: list[ProfilePoint], drive: CamDrive, length: str, metres: float, angle: str
-) -> bytes:
+def _profile_table(points: list[ProfilePoint], drive: CamDrive, length: str, angle: str) -> bytes:
     """Return a row for each point: the cam's angle, the lift, the profile, the pitch curve, pressure angle and radius."""
-    turned: Callable[[float], float] = float if angle == "rad" else math.degrees
-    unit = "rad" if angle == "rad" else "deg"
-    slides = drive.guide is not None
-    columns = {
-        f"cam_{unit}": [turned(point.angle) for point in points],
-        (f"lift_{length}" if slides else f"swing_{unit}"): [
-            point.lift / metres if slides else turned(point.lift) for point in points
-        ],
-        f"profile_x_{length}": [point.profile.real / metres for point in points],
-        f"profile_y_{length}": [point.profile.imag / metres for point in points],
-        f"pitch_x_{length}": [point.pitch.real / metres for point in points],
-        f"pitch_y_{length}": [point.pitch.imag / metres for point in points],
-        f"pressure_angle_{unit}": [turned(point.pressure_angle) for point in points],
-        f"curvature_radius_{length}": [
-            None if math.isinf(point.curvature_radius) else point.curvature_radius / metres
-            for point in points
-        ],
-    }
-    return csv_text(columns).encode()
+
+    def of(name: str) -> Any:
+        return np.array([getattr(point, name) for point in points])
+
+    def long(name: str, metres: Any) -> Column:
+        return number(name, "length", np.where(np.isinf(metres), np.nan, metres), length)
+
+    columns = [
+        _angle("cam", of("angle"), angle),
+        _angle("swing", of("lift"), angle) if drive.guide is None else long("lift", of("lift")),
+        *(long(f"{name}_{axis}", z) for name in ("profile", "pitch") for axis, z in _axes(of(name))),
+        _angle("pressure_angle", of("pressure_angle"), angle),
+        long("curvature_radius", of("curvature_radius")),
+    ]
+    return csv_text(Table(columns).cells).encode()
+
+
+def _axes(z: Complexes) -> tuple[tuple[str, Array], ...]:
+    return ("x", z.real), ("y", z.imag)

@@ -110,7 +110,7 @@ def file_bytes(
     travel = Travel(m)
     length, metres = unit_of(bare, suffix)
     if suffix == ".csv":
-        return curves(travel, length, metres, bare.get("angle", "rad")), []
+        return curves(travel, length, bare.get("angle", "rad")), []
     comment = _comment(m, inputs, file)
     if suffix in (".dxf", ".svg"):
         data = picture(draw(m, inputs, travel, length, metres), suffix, comment, metres)
