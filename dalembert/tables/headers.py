@@ -141,7 +141,8 @@ def _merged(header: str, unit: str, written: str) -> tuple[str, str]:
     suffix = own or parted(base)[1]
     # the name may add how an amplitude is read: mm_s_rms of a column in mm/s
     tagged = any(suffix.lower() == f"{unit}{tag}".lower() for tag in TAGS)
-    if suffix and unit and not tagged:
+    # what stands in brackets may be no unit: `Masse (Probe)`
+    if suffix and unit and not tagged and dimensions(unit):
         raise DataError(
             f"--column {header}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
         )
@@ -245,7 +246,7 @@ def offers(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Se
     for each in headings:
         base, unit = _stem(each)
         quantity, fit = _meant(base, unit, dimensions, texts)
-        if not quantity:
+        if not quantity and not unit:
             quantity = quantity_meant(base, dimensions)
             fit = next(iter(UNITS[dimensions[quantity]])) if quantity else ""
         if quantity:

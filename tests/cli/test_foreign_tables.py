@@ -98,6 +98,18 @@ def test_words_of_other_languages_are_read_and_said(
         assert (f"'{header}' as {name}" in done.stderr) is not english
 
 
+@pytest.mark.parametrize("column", ["mass_g=Masse (Probe)", "mass_g=Masse"])
+def test_words_in_brackets_are_no_unit(column: str, dalembert: Dalembert) -> None:
+    table = "Masse (Probe);radius_mm;angle_deg\n90,5;30;60\n60;50,25;210\n"
+    done = dalembert("balance", "-", *PLANE, "--column", column, stdin=table)
+    assert done.stdout == dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+    refused = dalembert("balance", "-", *PLANE, stdin=table)
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "did you mean" not in refused.stderr
+    clash = dalembert("balance", "-", *PLANE, "--column", "mass_g=Masse", stdin=table.replace("Probe", "kg"))
+    assert "found the unit 'kg' in the file, expected 'g'" in clash.stderr
+
+
 def test_every_column_of_a_german_table_is_read(dalembert: Dalembert, tmp_path: Path) -> None:
     planes = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")
     german = "Läufer;Bezeichnung;Gewicht [N];Radius [mm];Winkellage [Grad];Abstand [mm]\n"
@@ -115,7 +127,8 @@ def test_every_column_of_a_german_table_is_read(dalembert: Dalembert, tmp_path: 
     ("header", "message"),
     [
         ("Masse [g];Gewicht [g];Radius [mm];Winkel [°]", "no column mass_kg"),  # two of one meaning
-        ("Masse [mm];Radius [mm];Winkel [°];Name", "--column mass_kg='Masse [mm]'"),
+        ("Masse [mm];Radius [mm];Winkel [°];Name", "Masse [mm], Radius [mm], Winkel [°], Name)\n"),
+        ("Masse [Pfund];Radius [mm];Winkel [°];Name", "Masse [Pfund], Radius [mm], Winkel [°], Name)\n"),
         ("Masse;Radius [mm];Winkel [°];Name", "--column mass_kg=Masse"),
         ("Masse [g];Radius [mm];Unwucht [g mm];Winkel [°]", "mixed columns Masse [g] and Unwucht [g mm]"),
     ],
