@@ -255,7 +255,7 @@ def offers(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Se
 
 
 def translated(headings: Sequence[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> list[str]:
-    """Return the names that foreign words in headers mean; where the unit does not fit, or two would share one, the own name."""
+    """Return the names that foreign words in headers mean; a column whose word or unit is not known keeps its own."""
     names = [each.name for each in headings]
     for place, each in enumerate(headings):
         base, unit = _stem(each)
@@ -271,7 +271,7 @@ def _stem(each: Heading) -> tuple[str, str]:
 
 
 def _meant(base: str, unit: str, dimensions: Mapping[str, str], texts: Sequence[str]) -> tuple[str, str]:
-    """Return the quantity that a word means and the name of its unit: `Gewicht` in N is a weight, in g a mass."""
+    """Return the quantity that a word means, of those with this unit, and the unit's name: `Gewicht` in N is a weight, in g a mass."""
     units = {name: find_unit(dimension, unit) for name, dimension in dimensions.items()}
     fits: dict[str, str] = {name: of for name, of in units.items() if of is not None}
     quantity = quantity_meant(base, (*fits, *texts))
