@@ -278,7 +278,7 @@ def _meant(base: str, unit: str, dimensions: Mapping[str, str], texts: Sequence[
     return quantity, fits.get(quantity, "")
 
 
-# -- what quantities are called in English, German, Portuguese, Spanish and French: for hints alone --------
+# -- what quantities are called in English, German, Portuguese, Spanish and French -----------------------
 
 _WORDS = {
     "mass": "mass masse wuchtmasse massa masa gewicht",
@@ -288,7 +288,7 @@ _WORDS = {
     "angle": "angle winkel winkellage drehwinkel kurbelwinkel angulo ang theta position_angulaire winkelposition",
     "turned": "turned drehwinkel gedreht umschlagwinkel verdrehung verdrehwinkel",
     "z": "z axial axial_position abstand lage posicao_axial posicion_axial position_axiale cote distance ebenenlage",
-    "unbalance": "unbalance imbalance unwucht desbalanceamento desbalanco desequilibrio balourd",
+    "unbalance": "unbalance imbalance unwucht testunwucht probeunwucht setzunwucht desbalanceamento desbalanco desequilibrio balourd",
     "plane": "plane ebene ausgleichsebene plano plano_de_correcao plano_de_correccion plan plan_de_correction",
     "rotor": "rotor machine maschine laeufer maquina",
     "name": "name bezeichnung benennung nome nombre nom teil",
@@ -299,9 +299,10 @@ _WORDS = {
     "vibracion amplitud displacement velocity acceleration valor wert",
     "phase": "phase phasenlage phasenwinkel fase fase_angular angle_de_phase",
     "date": "date datum data fecha",
-    "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht massa_de_teste massa_de_prova "
+    "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht setzmasse setzgewicht ausgleichsmasse ausgleichsgewicht korrekturmasse "
+    "korrekturgewicht massa_de_teste massa_de_prova "
     "massa_tentativa masa_de_prueba peso_de_prueba masse_d_essai masse_test",
-    "trial_angle": "trial_angle testwinkel probewinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",
+    "trial_angle": "trial_angle testwinkel probewinkel setzwinkel ausgleichswinkel korrekturwinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",
     "trial_plane": "trial_plane correction_plane testebene probeebene ausgleichsebene wuchtebene plano_de_teste plano_de_prueba plan_d_essai plane ebene plano plan",
     "part": "part teil bauteil peca pieza piece",
     "shape": "shape form koerper forma forme",

@@ -172,6 +172,25 @@ def test_a_german_table_of_positions(header: str, plain: str, dalembert: Dalembe
     assert done.stdout == dalembert("index", "-", stdin=f"{plain}\n{rows}").stdout
 
 
+@pytest.mark.parametrize(
+    "trial",
+    [
+        "Ebene;Testmasse [g];Testwinkel [°]",
+        "Ausgleichsebene;Ausgleichsmasse [g];Ausgleichswinkel [Grad]",
+        "Wuchtebene;Setzgewicht [Gramm];Setzwinkel [Grad]",
+        "Ebene;Testunwucht [g mm];Testwinkel [Grad]",
+    ],
+)
+def test_a_german_word_for_a_trial_mass(trial: str, dalembert: Dalembert) -> None:
+    rows = "\n0;1;80,5;40;;;\n1;1;60;90;A;5;0\n"
+    plain = "run;sensor;amplitude_um;phase_deg;trial_plane;trial_mass_g;trial_angle_deg"
+    if "unwucht" in trial:
+        plain = plain.replace("trial_mass_g", "trial_unbalance_g_mm")
+    done = dalembert("field", "-", stdin=f"Lauf;Lager;Schwingweg [µm];Phase [°];{trial}{rows}")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("field", "-", stdin=plain + rows).stdout
+
+
 def test_a_german_run_out(dalembert: Dalembert, tmp_path: Path) -> None:
     runs = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,5,40,,,\n1,1,6,90,A,10,0\n"
     (tmp_path / "plain.csv").write_text("sensor;amplitude_um;phase_deg\n1;0,5;30\n")
