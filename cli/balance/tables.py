@@ -283,4 +283,8 @@ def warnings(b: Balancing) -> list[str]:
         return lines
     if b.request.center is None and (limit.bearings is not None or (b.count == 2).any()):
         lines.append("no --center-z: the permissible residual unbalance is shared equally between the planes")
+    if limit.bearings is None and (b.count > 2).any():
+        lines.append(
+            "more than two planes share the permissible residual unbalance equally; --bearings shows it in two"
+        )
     return lines

@@ -360,7 +360,7 @@ def rotor(variant: Variant, answer: Answer) -> Rotor | None:
     return Rotor(
         [names[k] for k in rows], read.moment[rows], angle.values[rows] if angle.unit == "deg" else None,
         read.radius_unit is not None, z[rows], planes.name, np.asarray(plane_z, float), np.asarray(planes.radius, float),
-        variant.problem.gravity, "weight" in read.table.numbers, -1.0 if own["remove"] else 1.0,
+        variant.problem.gravity, bool(read.weight_unit), -1.0 if own["remove"] else 1.0,
     )  # fmt: skip
 
 

@@ -122,7 +122,7 @@ def _whole_turns(table: ReadTable, angle: Numbers) -> int:
     if step and np.allclose(steps, step, rtol=1e-6) and abs(last + step - ends[-1]) < 1e-3 * step:
         missing = f": the last row is missing, where the torque is that of {first:g} {angle.unit} again"
     raise DataError(
-        f"{table.file}: column {angle.header}: found {first:g} to {last:g} {angle.unit}, not whole turns of the shaft; "
+        f"{table.file}: column {angle.header}: found {first:.10g} to {last:.10g} {angle.unit}, not whole turns of the shaft; "
         f"expected a last row at {whole}{missing}"
     )
 

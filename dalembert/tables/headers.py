@@ -141,7 +141,8 @@ def _merged(header: str, unit: str, written: str) -> tuple[str, str]:
     suffix = own or parted(base)[1]
     # the name may add how an amplitude is read: mm_s_rms of a column in mm/s
     tagged = any(suffix.lower() == f"{unit}{tag}".lower() for tag in TAGS)
-    if suffix and unit and not tagged:
+    # what stands in brackets may be no unit: `Masse (Probe)`
+    if suffix and unit and not tagged and dimensions(unit):
         raise DataError(
             f"--column {header}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
         )
@@ -245,7 +246,7 @@ def offers(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Se
     for each in headings:
         base, unit = _stem(each)
         quantity, fit = _meant(base, unit, dimensions, texts)
-        if not quantity:
+        if not quantity and not unit:
             quantity = quantity_meant(base, dimensions)
             fit = next(iter(UNITS[dimensions[quantity]])) if quantity else ""
         if quantity:
@@ -254,7 +255,7 @@ def offers(headings: Iterable[Heading], dimensions: Mapping[str, str], texts: Se
 
 
 def translated(headings: Sequence[Heading], dimensions: Mapping[str, str], texts: Sequence[str]) -> list[str]:
-    """Return the names that foreign words in headers mean; where the unit does not fit, or two would share one, the own name."""
+    """Return the names that foreign words in headers mean; a column whose word or unit is not known keeps its own."""
     names = [each.name for each in headings]
     for place, each in enumerate(headings):
         base, unit = _stem(each)
@@ -270,14 +271,14 @@ def _stem(each: Heading) -> tuple[str, str]:
 
 
 def _meant(base: str, unit: str, dimensions: Mapping[str, str], texts: Sequence[str]) -> tuple[str, str]:
-    """Return the quantity that a word means and the name of its unit: `Gewicht` in N is a weight, in g a mass."""
+    """Return the quantity that a word means, of those with this unit, and the unit's name: `Gewicht` in N is a weight, in g a mass."""
     units = {name: find_unit(dimension, unit) for name, dimension in dimensions.items()}
     fits: dict[str, str] = {name: of for name, of in units.items() if of is not None}
     quantity = quantity_meant(base, (*fits, *texts))
     return quantity, fits.get(quantity, "")
 
 
-# -- what quantities are called in English, German, Portuguese, Spanish and French: for hints alone --------
+# -- what quantities are called in English, German, Portuguese, Spanish and French -----------------------
 
 _WORDS = {
     "mass": "mass masse wuchtmasse massa masa gewicht",
@@ -287,7 +288,7 @@ _WORDS = {
     "angle": "angle winkel winkellage drehwinkel kurbelwinkel angulo ang theta position_angulaire winkelposition",
     "turned": "turned drehwinkel gedreht umschlagwinkel verdrehung verdrehwinkel",
     "z": "z axial axial_position abstand lage posicao_axial posicion_axial position_axiale cote distance ebenenlage",
-    "unbalance": "unbalance imbalance unwucht desbalanceamento desbalanco desequilibrio balourd",
+    "unbalance": "unbalance imbalance unwucht testunwucht probeunwucht setzunwucht desbalanceamento desbalanco desequilibrio balourd",
     "plane": "plane ebene ausgleichsebene plano plano_de_correcao plano_de_correccion plan plan_de_correction",
     "rotor": "rotor machine maschine laeufer maquina",
     "name": "name bezeichnung benennung nome nombre nom teil",
@@ -298,9 +299,10 @@ _WORDS = {
     "vibracion amplitud displacement velocity acceleration valor wert",
     "phase": "phase phasenlage phasenwinkel fase fase_angular angle_de_phase",
     "date": "date datum data fecha",
-    "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht massa_de_teste massa_de_prova "
+    "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht setzmasse setzgewicht ausgleichsmasse ausgleichsgewicht korrekturmasse "
+    "korrekturgewicht massa_de_teste massa_de_prova "
     "massa_tentativa masa_de_prueba peso_de_prueba masse_d_essai masse_test",
-    "trial_angle": "trial_angle testwinkel probewinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",
+    "trial_angle": "trial_angle testwinkel probewinkel setzwinkel ausgleichswinkel korrekturwinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",
     "trial_plane": "trial_plane correction_plane testebene probeebene ausgleichsebene wuchtebene plano_de_teste plano_de_prueba plan_d_essai plane ebene plano plan",
     "part": "part teil bauteil peca pieza piece",
     "shape": "shape form koerper forma forme",

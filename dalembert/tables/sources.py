@@ -112,7 +112,7 @@ class Source:
         )
 
     def named(self, names: Sequence[str]) -> Source:
-        """Return the table with its columns under these names; one that two columns would share stays, and what was read is said."""
+        """Return the table with its columns under these names, and warn of it; a column whose name another one has too keeps its own."""
         read = [
             (k, each, name)
             for k, (each, name) in enumerate(zip(self.headings, names, strict=True))

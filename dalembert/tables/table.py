@@ -223,7 +223,7 @@ def read(
     marker
         Cells of `numbers` that begin with it are no numbers: NaN, and their text in `Table.marks`.
     needed
-        Sets of columns of which the table needs one: where it has none, words of other languages in its header are taken too.
+        Sets of columns: the table needs one of each. If one set is missing, headers in other languages are read too.
     headers
         What the header as written means: the columns' names by their places.
     layout

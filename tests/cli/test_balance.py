@@ -214,6 +214,12 @@ def test_tolerance_in_the_bearings(dalembert: Dalembert) -> None:
     halves = answer(dalembert("balance", "-", *planes, *options, "--json", stdin=table))
     assert any("shared equally" in warning for warning in halves["warnings"])
     assert [p["within"] for p in halves["rotors"][0]["tolerance"]["planes"]] == [True, False]
+    three = (*planes, "--plane", "C:2200mm:100mm", *options[:-2])
+    for more in ((), ("--center-z", "1500mm")):
+        third = answer(dalembert("balance", "-", *three, *more, "--json", stdin=table))
+        assert any("more than two planes share" in warning for warning in third["warnings"])
+        parts = [p["permissible_kg_m"] for p in third["rotors"][0]["tolerance"]["planes"]]
+        assert parts == pytest.approx([0.02864788975654116 / 3] * 3, rel=1e-14)
 
 
 def test_permissible_unbalance_in_place_of_a_grade(dalembert: Dalembert) -> None:

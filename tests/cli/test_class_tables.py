@@ -98,10 +98,15 @@ def test_a_table_that_the_command_cannot_read_is_no_matter_of_the_drawn_values(
     dalembert: Dalembert, german: Path
 ) -> None:
     (german / "e.toml").write_text(EXERCISE.replace(" --column mass_g='Masse [g]'", ""), encoding="utf-8")
+    table = german / "rotor.csv"
+    table.write_text(table.read_text(encoding="utf-8").replace("z [mm]", "w [mm]"), encoding="utf-8")
     done = dalembert("exercise", "e.toml", "-o", "out")
     assert done.returncode == 1
-    assert done.stderr.startswith("dalembert: e.toml: key command: rotor.csv: no column mass_kg"), done.stderr
+    assert done.stderr.startswith("dalembert: e.toml: key command: rotor.csv: no column z_m"), done.stderr
     assert not (german / "out").exists()
+    # words that are known are read
+    table.write_text(table.read_text(encoding="utf-8").replace("w [mm]", "Abstand [mm]"), encoding="utf-8")
+    assert dalembert("exercise", "e.toml", "-o", "out").returncode == 0
 
 
 def test_the_figure_of_a_motion_has_its_first_instant(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -98,6 +98,18 @@ def test_words_of_other_languages_are_read_and_said(
         assert (f"'{header}' as {name}" in done.stderr) is not english
 
 
+@pytest.mark.parametrize("column", ["mass_g=Masse (Probe)", "mass_g=Masse"])
+def test_words_in_brackets_are_no_unit(column: str, dalembert: Dalembert) -> None:
+    table = "Masse (Probe);radius_mm;angle_deg\n90,5;30;60\n60;50,25;210\n"
+    done = dalembert("balance", "-", *PLANE, "--column", column, stdin=table)
+    assert done.stdout == dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+    refused = dalembert("balance", "-", *PLANE, stdin=table)
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "did you mean" not in refused.stderr
+    clash = dalembert("balance", "-", *PLANE, "--column", "mass_g=Masse", stdin=table.replace("Probe", "kg"))
+    assert "found the unit 'kg' in the file, expected 'g'" in clash.stderr
+
+
 def test_every_column_of_a_german_table_is_read(dalembert: Dalembert, tmp_path: Path) -> None:
     planes = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")
     german = "Läufer;Bezeichnung;Gewicht [N];Radius [mm];Winkellage [Grad];Abstand [mm]\n"
@@ -115,7 +127,8 @@ def test_every_column_of_a_german_table_is_read(dalembert: Dalembert, tmp_path: 
     ("header", "message"),
     [
         ("Masse [g];Gewicht [g];Radius [mm];Winkel [°]", "no column mass_kg"),  # two of one meaning
-        ("Masse [mm];Radius [mm];Winkel [°];Name", "--column mass_kg='Masse [mm]'"),
+        ("Masse [mm];Radius [mm];Winkel [°];Name", "Masse [mm], Radius [mm], Winkel [°], Name)\n"),
+        ("Masse [Pfund];Radius [mm];Winkel [°];Name", "Masse [Pfund], Radius [mm], Winkel [°], Name)\n"),
         ("Masse;Radius [mm];Winkel [°];Name", "--column mass_kg=Masse"),
         ("Masse [g];Radius [mm];Unwucht [g mm];Winkel [°]", "mixed columns Masse [g] and Unwucht [g mm]"),
     ],
@@ -157,6 +170,25 @@ def test_a_german_table_of_positions(header: str, plain: str, dalembert: Dalembe
     done = dalembert("index", "-", stdin=f"{header}\n{rows}")
     assert done.returncode == 0, done.stderr
     assert done.stdout == dalembert("index", "-", stdin=f"{plain}\n{rows}").stdout
+
+
+@pytest.mark.parametrize(
+    "trial",
+    [
+        "Ebene;Testmasse [g];Testwinkel [°]",
+        "Ausgleichsebene;Ausgleichsmasse [g];Ausgleichswinkel [Grad]",
+        "Wuchtebene;Setzgewicht [Gramm];Setzwinkel [Grad]",
+        "Ebene;Testunwucht [g mm];Testwinkel [Grad]",
+    ],
+)
+def test_a_german_word_for_a_trial_mass(trial: str, dalembert: Dalembert) -> None:
+    rows = "\n0;1;80,5;40;;;\n1;1;60;90;A;5;0\n"
+    plain = "run;sensor;amplitude_um;phase_deg;trial_plane;trial_mass_g;trial_angle_deg"
+    if "unwucht" in trial:
+        plain = plain.replace("trial_mass_g", "trial_unbalance_g_mm")
+    done = dalembert("field", "-", stdin=f"Lauf;Lager;Schwingweg [µm];Phase [°];{trial}{rows}")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("field", "-", stdin=plain + rows).stdout
 
 
 def test_a_german_run_out(dalembert: Dalembert, tmp_path: Path) -> None:
