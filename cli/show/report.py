@@ -308,11 +308,12 @@ th, td { padding: .5mm 1.6mm; text-align: left; vertical-align: top; border-bott
 th { background: #eee; font-weight: 600; vertical-align: bottom } .n { text-align: right; font-variant-numeric: tabular-nums }
 td.n { white-space: nowrap } th, td { overflow-wrap: break-word } .long { overflow-wrap: anywhere } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
 .warning { border-left: 1mm solid #b00020; padding-left: 2mm } .warning { margin: 1mm 0; font-size: 9pt } footer { margin-top: 2mm; font-size: 8pt; color: #444 }
-figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
+figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; margin: 0 auto }
+@media print { svg { max-height: 95mm } .rows svg { max-height: 220mm } }
 .dense { font-size: 8.5pt } .dense table { font-size: 7.5pt; line-height: 1.25; margin: 1mm 0 } .dense td, .dense th { padding-top: .2mm; padding-bottom: .2mm }
 .dense p { margin: .8mm 0 } .dense h3 { font-size: 10pt; margin: 2.5mm 0 .5mm } @media print { .dense svg { max-height: 52mm } .verdict svg { max-height: 56mm } } .dense figure { margin: 1.5mm 0 }
-.wide { overflow-x: auto } section + section { break-before: page }
-@page { size: A4; margin: 12mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
+.wide, figure { overflow-x: auto } @media screen and (max-width: 40em) { figure svg { min-width: 540px } } section + section { break-before: page }
+@page { size: A4; margin: 12mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide, figure { overflow: visible } }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}
 LONG = 40

@@ -33,8 +33,7 @@ def around(middle: ArrayLike, radius: float) -> Real:
     """Return pixels (33, 2) around a circle, and its middle."""
     angle = np.linspace(0, 2 * np.pi, 32)
     ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    places: Real = np.asarray(middle, dtype=float) + np.concatenate([np.zeros((1, 2)), ring])
-    return places
+    return np.asarray(np.asarray(middle, dtype=float) + np.concatenate([np.zeros((1, 2)), ring]))
 
 
 def beside(

@@ -70,17 +70,13 @@ let due = 0;
 function update() {
   cancelAnimationFrame(due);
   due = 0;
-  copied("");
   // those of the earlier numbers
   $("limits").textContent = "";
   recompute(whole);
-  for (const { series, parts } of figures) {
-    for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
-  }
+  sizeCircles();
   if (shown === n && n > 1) $("slider").value = nearestPose();
+  // with the fields, and with what is to be said
   refresh();
-  listFields();
-  tell();
   clearTimeout(waiting);
   waiting = setTimeout(listLimits, 150);
 }

@@ -333,6 +333,11 @@ function drawAll(i) {
   words.done();
   drawPolygon(i);
 }
+function sizeCircles() {
+  for (const { series, parts } of figures) {
+    for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
+  }
+}
 let drawHandles; // of a page that computes
 let barAt; // its middle, half its length, its words
 function resize() {
@@ -344,9 +349,7 @@ function resize() {
   scale = Math.min((width - 2 * margin) / (right - left || 1e-300), (height - 2 * margin) / (high - low || 1e-300));
   px = (x) => width / 2 + scale * (x - (left + right) / 2);
   py = (y) => height / 2 - scale * (y - (low + high) / 2);
-  for (const { series, parts } of figures) {
-    for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
-  }
+  sizeCircles();
   missing.setAttribute("x", width / 2);
   missing.setAttribute("y", 20);
   // a length to measure by

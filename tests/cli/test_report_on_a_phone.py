@@ -47,7 +47,7 @@ def report(dalembert: Dalembert, tmp_path: Path, call: str) -> Path:
 def test_every_table_scrolls_by_itself(dalembert: Dalembert, tmp_path: Path) -> None:
     text = report(dalembert, tmp_path, "forces").read_text()
     assert text.count("<table>") == text.count('<div class="wide"><table>') > 0
-    assert ".wide { overflow-x: auto }" in text
+    assert ".wide, figure { overflow-x: auto }" in text
 
 
 @pytest.mark.slow
@@ -65,6 +65,11 @@ def test_it_is_as_wide_as_the_screen(dalembert: Dalembert, tmp_path: Path, brows
             assert opened(
                 "return [...document.querySelectorAll('table')].every(t => "
                 "t.parentElement.scrollWidth >= t.getBoundingClientRect().width - 1)"
+            )
+            # so can a picture, whose words would be too small to read
+            assert opened(
+                "return [...document.querySelectorAll('figure svg')].every(s => s.getBoundingClientRect().width >= "
+                "Math.min(530, s.parentElement.clientWidth * 2))"
             )
     finally:
         opened.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
