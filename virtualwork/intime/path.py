@@ -18,7 +18,7 @@ from virtualwork.formulas.positions import unwound
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import TINY, DormandPrince
-from virtualwork.intime.growth import grown
+from virtualwork.intime.growth import Rounded, at_start, differences, flows, free, grown
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.marching import Nodes, loop, over
 from virtualwork.intime.watch import Floats
@@ -90,7 +90,8 @@ class Path:
         """Take away a node and all after it, but for the first."""
         del self.rows[max(1, node) :]
         # it is that of every step
-        self.__dict__.pop("noise", None)
+        for kept in ("noise", "_flows"):
+            self.__dict__.pop(kept, None)
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
@@ -186,24 +187,45 @@ class Path:
         h = np.diff(self.nodes.t)[:, None]
         return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
 
-    def grown(self, start: Reals | None) -> tuple[Reals, Reals | None]:
-        """What the motion makes of the rounding of all steps before, (n, k) of the inputs, and the covariance of the last state.
+    @property
+    def followed(self) -> bool:
+        """Whether small changes are followed along the motion: it is smooth (see `Equations.smooth`), and its steps are explicit.
 
-        It is not followed, 0 and None, where the motion is not smooth (friction and change points: see `Equations.smooth`), or steps are
-        implicit. `start` is the covariance at the beginning.
+        Those of the inputs, if not.
         """
-        nodes, k = self.nodes, self.equations.k
-        if self.method.stable == np.inf or not self.equations.smooth or not self.steps:
-            return np.zeros_like(nodes.q), None if self.steps else start
+        return self.method.stable < np.inf and self.equations.smooth
 
-        def rates(t: Reals, q: Reals, v: Reals) -> Reals:
-            return self.equations.many(t, q.T, v.T)[:, :k].T
+    @cached_property
+    def _flows(self) -> tuple[Reals, Reals, Reals]:
+        """The flows of small changes over each step, what rounds at random in it, and what it changes; see `growth.grown`."""
+        nodes, equations, k = self.nodes, self.equations, self.equations.k
+        noise = self.noise_of_speeds.T
+        if not self.followed:
+            # nothing pulls back or apart, and all is off one way
+            _, v, a, _ = self.states(nodes.t)
+            h, rates = np.diff(nodes.t), np.abs(np.concatenate([v, a], axis=1).T)
+            return free(h, k), noise, 0.5 * h * (rates[:, 1:] + rates[:, :-1])
+        q, v, a = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k]))
 
-        scale = np.array(self.equations.scale)
-        q, v, a, noise = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k], self.noise_of_speeds))
-        seen = None if self.coordinates.own else self.coordinates.seen(nodes.q)
-        size, last = grown(rates, scale, nodes.t, q, v, a, noise, not self.equations.stops, start, seen)
-        return size.T, last
+        def many(t: Reals, q: Reals, v: Reals) -> Reals:
+            return equations.many(t, q.T, v.T)[:, :k].T
+
+        flow, rounds = flows(many, np.array(equations.scale), nodes.t, q, v, a, not equations.stops)
+        return flow, np.hypot(noise, rounds), np.diff(np.concatenate([q, v]))
+
+    def grown(self, start: Rounded | None, apart: Reals | None = None) -> tuple[Reals, Rounded]:
+        """How far the inputs may be off for what rounds in all steps before, (n, k), and what has rounded in the last state.
+
+        `start` is that of the first state; `apart` how far another solution lies from the nodes, (2k, n): by how much the two part
+        over each step counts too.
+        """
+        nodes = self.nodes
+        start = at_start(nodes.q[0], nodes.v[0]) if start is None else start
+        flow, rounds, ways = self._flows
+        local = None if apart is None else differences(flow, apart)
+        seen = None if self.coordinates.own or not self.followed else self.coordinates.seen(nodes.q)
+        off, last = grown(flow, np.diff(nodes.t), rounds, ways, start, seen, local)
+        return off.T, last
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property
