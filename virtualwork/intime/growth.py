@@ -32,7 +32,9 @@ GAUSS = 0.5 - math.sqrt(3) / 6, 0.5 + math.sqrt(3) / 6
 # of the arguments of the accelerations in a stage
 ROUNDINGS = 3.0
 # of what changes over a step, for what is off the same way in every step
-SAME = 8.0
+SAME = 4.0
+# of the changes of speed more: the weights of the method's stages are large numbers that cancel
+STAGES = 2.0
 # how far from a state accelerations are looked at for their slopes, as a share of what errors of the inputs are relative to
 BESIDE = 2.0**-24
 Rates = Callable[[Reals, Reals, Reals], Reals]
@@ -42,8 +44,8 @@ Rates = Callable[[Reals, Reals, Reals], Reals]
 class Rounded(NamedTuple):
     """What rounding has made of a state (q, q̇): at random, a covariance (2k, 2k, …), and the same way in every step, (2k, 3k, …).
 
-    The latter has a column for what is off in the speed of each input, and two for what is off in its acceleration: at the end
-    of a step, and inside.
+    The latter has a column for what is off in the speed of each input, one for what is off in its acceleration, and one for what is
+    off in the sum of its loads.
     """
 
     spread: Reals
@@ -62,6 +64,7 @@ def grown(
     start: Rounded,
     seen: Reals | None = None,
     local: Reals | None = None,
+    stiff: bool = False,
 ) -> tuple[Reals, Rounded]:
     """How far the inputs may be off at the nodes of a way, (k, n, …), for what has rounded before, and the state at the last.
 
@@ -73,15 +76,17 @@ def grown(
         The lengths of the steps.
     rounds : array (k, n − 1, …)
         What rounding makes of the speeds over each step, by itself.
-    ways : array (2k, n − 1, …)
-        By how much q and q̇ change over each step: a share of it is off the same way in every step, for numbers of the
-        mechanism and of the method that are rounded.
+    ways : array (3k, n − 1, …)
+        By how much q and q̇ change over each step, and what q̇ would change by if all loads acted one way (see `ways_of`): a share
+        of it is off the same way in every step, for numbers of the mechanism and of the method that are rounded.
     start : Rounded
         At the first node.
     seen : array (k, k, n, …), optional
         Where the way has other coordinates: the derivatives of the inputs to these.
     local : array (2k, n − 1, …), optional
         What else every step is off by, one way or the other.
+    stiff : bool
+        Whether what is off shrinks within a step by far.
 
     Examples
     --------
@@ -90,18 +95,23 @@ def grown(
     >>> t = np.linspace(0, 20, 41)
     >>> q, v = np.cosh(t)[None], np.sinh(t)[None]
     >>> flow, rounds = flows(lambda t, q, v: q, np.ones(1), t, q, v, q)
-    >>> off, _ = grown(flow, np.diff(t), rounds, np.diff([q[0], v[0]]), at_start(q[:, 0], v[:, 0]))
+    >>> off, _ = grown(flow, np.diff(t), rounds, ways_of(np.diff(t), q, v), at_start(q[:, 0], v[:, 0]))
     >>> bool(0.5 < off[0, -1] / (EPS * np.cosh(20)) < 200)
     True
     """
     k, shape = len(rounds), (ways.shape[1] + 1, *ways.shape[2:])
     unit = np.broadcast_to(np.eye(k).reshape(k, k, *[1] * len(shape)), (k, k, *shape))
-    stirred = _diagonal(np.concatenate([h * rounds, rounds]) ** 2)
+    # what is off in an acceleration moves the inputs within the step too
+    inside = 0.0 * h if stiff else h
+    stirred, each = _diagonal(np.concatenate([inside * rounds, rounds]) ** 2), _diagonal(ways)
+    sums = each[k : 2 * k, 2 * k :] = each[2 * k :, 2 * k :]
+    each[:k, 2 * k :] = 0.5 * inside * sums
+    same = each[: 2 * k]
+    if stiff:
+        # as far as what pulls it back lets it
+        stirred, same = _moved(flow, stirred), _times(flow, same)
     if local is not None:
         stirred += np.einsum("i...,j...->ij...", local, local)
-    # what is off in an acceleration moves the inputs within the step too
-    inside = np.concatenate([0.5 * h * ways[k:], 0.0 * ways[k:]])
-    same = np.concatenate([_diagonal(ways), _diagonal(inside)[:, :k]], axis=1)
     with np.errstate(all="ignore"):
         return _along(flow, stirred, SAME * EPS * same, start, unit if seen is None else seen)
 
@@ -109,6 +119,17 @@ def grown(
 def differences(flow: Reals, apart: Reals) -> Reals:
     """By how much two ways part over each step, (m, n − 1, …), less what their distance before has become; they lie `apart` (m, n, …) at its ends."""
     return np.asarray(apart[:, 1:] - np.einsum("ij...,j...->i...", flow, apart[:, :-1]))
+
+
+def ways_of(h: Reals, q: Reals, v: Reals, sizes: Reals | float = 0.0) -> Reals:
+    """By how much q and q̇ (k, n, …) change over steps of length h, and what loads of these sizes change q̇ by, (3k, n − 1, …).
+
+    Sizes (k, n, …) are those of the accelerations that the loads bring about, each by itself: where they cancel, what they have
+    rounded remains.
+    """
+    sums = h * np.broadcast_to(sizes, q.shape)[:, 1:]
+    change = np.diff(v, axis=1)
+    return np.concatenate([np.diff(q, axis=1), change, np.maximum(sums, STAGES * np.abs(change))])
 
 
 def at_start(q: Reals, v: Reals) -> Rounded:
@@ -125,7 +146,14 @@ def free(h: Reals, k: int) -> Reals:
 
 
 def flows(
-    f: Rates, scale: Reals, t: Reals, q: Reals, v: Reals, a: Reals, steady: bool = True
+    f: Rates,
+    scale: Reals,
+    t: Reals,
+    q: Reals,
+    v: Reals,
+    a: Reals,
+    steady: bool = True,
+    stiff: bool = False,
 ) -> tuple[Reals, Reals]:
     """The flows of small changes (q, q̇) along the motion over each step, (2k, 2k, n − 1, …), and what rounding of the arguments makes of the speeds over it, (k, n − 1, …).
 
@@ -139,6 +167,8 @@ def flows(
         The inputs, their speeds and accelerations.
     steady : bool
         Whether the accelerations depend on the inputs and their speeds alone, and not on the time.
+    stiff : bool
+        Whether what is off shrinks within a step by far: Padé's fraction of degrees 1 and 2 stands for the exponential.
     """
     h = np.diff(t, axis=0)
     early, late = (_inside(share, t, q, v, a) for share in GAUSS)
@@ -146,11 +176,15 @@ def flows(
     at = [np.concatenate(both, axis=both[0].ndim - h.ndim) for both in zip(early, late, strict=True)]
     matrices, stirred = _linear(f, scale, at[0], at[1], at[2])
     first, last = np.split(matrices, 2, axis=2)
-    turning = math.sqrt(3) / 12 * h * h * (_times(last, first) - _times(first, last))
-    flow = _exponential(0.5 * h * (first + last) + turning)
-    if steady:
-        with np.errstate(all="ignore"):
-            flow = _along_itself(flow, np.concatenate([v, a]), h, scale)
+    mean = 0.5 * h * (first + last)
+    if stiff:
+        flow = _fraction(mean)
+    else:
+        turning = math.sqrt(3) / 12 * h * h * (_times(last, first) - _times(first, last))
+        flow = _exponential(mean + turning)
+        if steady:
+            with np.errstate(all="ignore"):
+                flow = _along_itself(flow, np.concatenate([v, a]), h, scale)
     return flow, ROUNDINGS * EPS * h * np.maximum(*np.split(stirred, 2, axis=1))
 
 
@@ -212,6 +246,15 @@ def _exponential(a: Reals) -> Reals:
     for _ in range(HALVINGS):
         part = _times(part, part)
     return np.asarray(part)
+
+
+def _fraction(a: Reals) -> Reals:
+    """(1 − ⅔ a + ⅙ a²)⁻¹ (1 + ⅓ a) of matrices: near their exponentials, and none where these are (Hairer and Wanner, II, §IV.3)."""
+    one = np.zeros_like(a)
+    one[range(len(a)), range(len(a))] = 1.0
+    below, above = one - 2 / 3 * a + _times(a, a) / 6, one + a / 3
+    solved = np.linalg.solve(*(np.moveaxis(x, (0, 1), (-2, -1)) for x in (below, above)))
+    return np.asarray(np.moveaxis(solved, (-2, -1), (0, 1)))
 
 
 def _along(flow: Reals, rounds: Reals, ways: Reals, start: Rounded, seen: Reals) -> tuple[Reals, Rounded]:

@@ -18,7 +18,7 @@ from virtualwork.formulas.positions import unwound
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import TINY, DormandPrince
-from virtualwork.intime.growth import Rounded, at_start, differences, flows, free, grown
+from virtualwork.intime.growth import Rounded, at_start, differences, flows, free, grown, ways_of
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.marching import Nodes, loop, over
 from virtualwork.intime.watch import Floats
@@ -154,6 +154,11 @@ class Path:
         """The node before each time."""
         return np.clip(np.searchsorted(self.nodes.t, times, side="right") - 1, 0, self.steps)
 
+    @property
+    def _which(self) -> Any:
+        """The nodes at which rounding is looked at."""
+        return np.unique(np.linspace(0, self.steps, min(SAMPLES, 2 + self.steps // 4)).astype(int))
+
     @cached_property
     def noise(self) -> Reals:
         """The standard deviation of what rounding makes of the accelerations over each step, (n − 1, k), from that at some nodes.
@@ -163,8 +168,7 @@ class Path:
         that is stretched by a millionth of a metre has nine digits fewer.
         """
         nodes, k = self.nodes, self.equations.k
-        which = np.unique(np.linspace(0, self.steps, min(SAMPLES, 2 + self.steps // 4)).astype(int))
-        some = nodes.at(which)
+        which, some = self._which, nodes.at(self._which)
         # at other distances beside every node: whole units of the last place would all round alike
         beside = BESIDE * (1.0 + np.modf(0.618 * np.arange(1, len(which) + 1))[0])[:, None]
         apart = np.arange(-4.0, 5.0)[:, None, None] * (beside * np.array(self.equations.scale))
@@ -188,30 +192,42 @@ class Path:
         return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
 
     @property
-    def followed(self) -> bool:
-        """Whether small changes are followed along the motion: it is smooth (see `Equations.smooth`), and its steps are explicit.
+    def _sizes(self) -> Reals:
+        """What the loads add to the accelerations, summed without signs, (k, n), from that at some nodes."""
+        t, some = self.nodes.t, self.nodes.at(self._which)
+        sizes = self.equations.load_sizes(some.t, some.q, some.v)
+        return np.stack([np.interp(t, some.t, of) for of in sizes.T])
 
-        Those of the inputs, if not.
-        """
-        return self.method.stable < np.inf and self.equations.smooth
+    @property
+    def _stiff(self) -> bool:
+        """Whether what is off shrinks within a step by far."""
+        return self.followed and self.method.stable == np.inf
+
+    @property
+    def followed(self) -> bool:
+        """Whether small changes are followed along the motion, which is smooth (see `Equations.smooth`); those of the inputs, if not."""
+        return self.equations.smooth
 
     @cached_property
     def _flows(self) -> tuple[Reals, Reals, Reals]:
         """The flows of small changes over each step, what rounds at random in it, and what it changes; see `growth.grown`."""
         nodes, equations, k = self.nodes, self.equations, self.equations.k
-        noise = self.noise_of_speeds.T
+        noise, h = self.noise_of_speeds.T, np.diff(nodes.t)
         if not self.followed:
             # nothing pulls back or apart, and all is off one way
-            _, v, a, _ = self.states(nodes.t)
-            h, rates = np.diff(nodes.t), np.abs(np.concatenate([v, a], axis=1).T)
-            return free(h, k), noise, 0.5 * h * (rates[:, 1:] + rates[:, :-1])
+            q, v, a = (x.T for x in self.states(nodes.t)[:3])
+            rates = np.abs(np.concatenate([v, a]))
+            ways = 0.5 * h * (rates[:, 1:] + rates[:, :-1])
+            return free(h, k), noise, np.concatenate([ways, ways_of(h, q, v, self._sizes)[2 * k :]])
         q, v, a = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k]))
 
         def many(t: Reals, q: Reals, v: Reals) -> Reals:
             return equations.many(t, q.T, v.T)[:, :k].T
 
-        flow, rounds = flows(many, np.array(equations.scale), nodes.t, q, v, a, not equations.stops)
-        return flow, np.hypot(noise, rounds), np.diff(np.concatenate([q, v]))
+        flow, rounds = flows(
+            many, np.array(equations.scale), nodes.t, q, v, a, not equations.stops, self._stiff
+        )
+        return flow, np.hypot(noise, rounds), ways_of(h, q, v, self._sizes)
 
     def grown(self, start: Rounded | None, apart: Reals | None = None) -> tuple[Reals, Rounded]:
         """How far the inputs may be off for what rounds in all steps before, (n, k), and what has rounded in the last state.
@@ -224,7 +240,7 @@ class Path:
         flow, rounds, ways = self._flows
         local = None if apart is None else differences(flow, apart)
         seen = None if self.coordinates.own or not self.followed else self.coordinates.seen(nodes.q)
-        off, last = grown(flow, np.diff(nodes.t), rounds, ways, start, seen, local)
+        off, last = grown(flow, np.diff(nodes.t), rounds, ways, start, seen, local, self._stiff)
         return off.T, last
 
     # --- the inputs -----------------------------------------------------------------------------------------------

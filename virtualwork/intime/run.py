@@ -308,7 +308,8 @@ def _simulated(
         worst = float((error / scale).max())
         if worst <= accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
             break
-        if worst <= 2 * float((unavoidable(fine, fine.nodes) / scale).max()):
+        least = float((unavoidable(fine, fine.nodes) / scale).max())
+        if worst <= 2 * least and least <= UNKNOWN:
             # shorter steps gain little
             break
         tolerance = finer

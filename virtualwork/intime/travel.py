@@ -130,8 +130,9 @@ class Travel:
 
     @property
     def followed(self) -> bool:
-        """Whether small changes are followed along all of it, in the inputs."""
-        return len(self.legs) == 1 and self.legs[0].followed and self.legs[0].coordinates.own
+        """Whether small changes are followed along all of it, in the inputs, by explicit steps."""
+        leg = self.legs[0]
+        return len(self.legs) == 1 and leg.followed and leg.coordinates.own and leg.method.stable < np.inf
 
     def grown(self, times: Reals, share: float = 0.0) -> Reals:
         """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).

@@ -28,7 +28,7 @@ from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed, sides
 from virtualwork.intime.estimate import GAIN, LEAST, TRIES, apart, first_tolerance, share, spread
-from virtualwork.intime.growth import at_start, differences, flows, grown
+from virtualwork.intime.growth import at_start, differences, flows, grown, ways_of
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
@@ -119,9 +119,9 @@ class Runs:
 class Variants(Family):
     """Variants of a mechanism that can be simulated; `Mechanism.vary` makes them."""
 
-    # what is written down once: the formulas, and the tapes of accelerations and energies
+    # what is written down once: the formulas, and the tapes of accelerations, energies and loads
     alike: Solver | None = None
-    tapes: tuple[Tape, Tape] | None = None
+    tapes: tuple[Tape, Tape, Tape] | None = None
 
     def simulate(
         self,
@@ -215,6 +215,7 @@ class _Lanes:
     written: VariedFormulas
     rates: Tape
     energy: Tape
+    loads: Tape
     given: dict[str, Reals]
     together: Mask
     t: Reals
@@ -249,7 +250,7 @@ class _Lanes:
             except ZeroDivisionError:
                 # no mass moves: each says so
                 return None
-        rates, energy = family.tapes
+        rates, energy, loads = family.tapes
         places, speeds, _ = names(k)
         if not {*places, *speeds, *entering}.issuperset(rates.inputs):
             return None
@@ -258,7 +259,19 @@ class _Lanes:
         if slides:
             scale[:, slides] = np.array([family[i].size for i in range(len(q))])[:, None]
         return cls(
-            family, solver, solver.written, rates, energy, entering, solver.together, t, q, v, scale, levels
+            family,
+            solver,
+            solver.written,
+            rates,
+            energy,
+            loads,
+            entering,
+            solver.together,
+            t,
+            q,
+            v,
+            scale,
+            levels,
         )
 
     @property
@@ -373,17 +386,16 @@ class _Lanes:
 
     def _grown(self, rows: Rows, nodes: Nodes, changes: Reals) -> Reals:
         """What the motions make of rounding, and of how two ways part over each step, the largest so far, (lanes, rounds, k)."""
-        scale = self.scale[rows].T
+        scale, h = self.scale[rows].T, np.diff(nodes.t, axis=0)
 
-        def rates(t: Reals, q: Reals, v: Reals) -> Reals:
+        def of(tape: Tape, q: Reals, v: Reals) -> Reals:
             flat = (x.reshape(self.k, -1).T for x in (q, v))
-            return self._run(self.rates, np.tile(rows, len(t)), *flat)[:, : self.k].T.reshape(q.shape)
+            return self._run(tape, np.tile(rows, q.shape[1]), *flat)[:, : self.k].T.reshape(q.shape)
 
         q, v, a = (np.moveaxis(x, -1, 0) for x in (nodes.q, nodes.v, nodes.rates[..., :-1]))
-        flow, rounds = flows(rates, scale, nodes.t, q, v, a)
-        ways, local = np.diff(np.concatenate([q, v]), axis=1), differences(flow, changes)
-        start = at_start(q[:, 0], v[:, 0])
-        size, _ = grown(flow, np.diff(nodes.t, axis=0), rounds, ways, start, local=local)
+        flow, rounds = flows(lambda t, q, v: of(self.rates, q, v), scale, nodes.t, q, v, a)
+        start, local = at_start(q[:, 0], v[:, 0]), differences(flow, changes)
+        size, _ = grown(flow, h, rounds, ways_of(h, q, v, of(self.loads, q, v)), start, local=local)
         return np.asarray(np.maximum.accumulate(np.minimum(size, scale[:, None]), axis=1).T)
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
