@@ -373,7 +373,7 @@ class _Lanes:
         return result
 
     def _error(self, rows: Rows, coarse: Nodes, fine: Nodes, times: Reals) -> Reals:
-        """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
+        """The error of the inputs at all times, (lanes, n, k), as `estimate.input_error`."""
         part, ends = share(True), fine.at(np.s_[::2])
         q, off, faster = (np.swapaxes(x, 0, 1) for x in (ends.q, ends.q - coarse.q, ends.v - coarse.v))
         result = spread(q, apart(coarse.t.T, off, faster), part)
@@ -381,7 +381,7 @@ class _Lanes:
         for lanes in np.array_split(np.arange(len(rows)), 1 + len(rows) * len(coarse.t) // HELD):
             result[lanes] += self._grown(rows[lanes], coarse.at(np.s_[:, lanes]), changes[lanes].T)
         at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
-        at = np.minimum(at, len(coarse.t) - 1)
+        at = np.minimum(at + (at > 0), len(coarse.t) - 1)
         return np.asarray(result[np.arange(len(result))[:, None], at])
 
     def _grown(self, rows: Rows, nodes: Nodes, changes: Reals) -> Reals:
