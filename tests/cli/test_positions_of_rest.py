@@ -41,6 +41,23 @@ def test_equilibrium_of_a_wound_spring(dalembert: Dalembert) -> None:
     assert abs(found["poses"][0]["effort"]["input_torque_N_m"]) < 1e-13 * 9.81
 
 
+@pytest.mark.parametrize(("stiffness", "stable"), [(9.81, None), (9.8, False), (9.82, True)])
+def test_equilibrium_of_a_spring_of_critical_stiffness(
+    dalembert: Dalembert, stiffness: float, stable: bool | None
+) -> None:
+    """Upright on a torsion spring of k = m g c the second variation is zero: neither stability nor a period follows from it."""
+    text = (
+        BOB
+        + f'[[torsion_springs]]\nlinks = ["ground", "bob"]\nstiffness = {stiffness}\nfree_angle = "90 deg"\n'
+    )
+    rest = document(dalembert("equilibrium", "-", "--json", stdin=text))["equilibria"]
+    assert len(rest) == (3 if stable is False else 1)
+    upright = rest[len(rest) // 2]
+    assert upright["input_deg"] == pytest.approx(90, abs=1e-3 if stable is None else 1e-9)
+    assert upright["stable"] is stable
+    assert (upright["period_s"] is None) == (not stable)
+
+
 @pytest.mark.parametrize(
     ("ratio", "searched"), [("-0.5", None), ("0.7", None), ("-0.7071", "from -360 to 360 deg")]
 )

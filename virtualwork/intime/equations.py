@@ -196,8 +196,8 @@ class Equations:
 
     # --- the tape ---------------------------------------------------------------------------------------------
     @cached_property
-    def _recorded(self) -> tuple[Tape, Tape]:
-        """The tapes of accelerations and power, and of the energies."""
+    def _recorded(self) -> tuple[Tape, Tape, Tape]:
+        """The tapes of accelerations and power, of the energies, and of the sizes of loads."""
         return motion_of(self.recording(True, True, False), self.k)
 
     @cached_property
@@ -263,6 +263,16 @@ class Equations:
                 beside = self._run(tape, *nodes)["energy"]
                 (out[i],) = crossing.interpolated(beside[:, None].tolist(), float(q[i, 0]))
         return out
+
+    def load_sizes(self, t: Reals, q: Reals, v: Reals) -> Reals:
+        """What the loads add to the accelerations, each by itself, summed without signs, (n, k): what cancels has rounded.
+
+        Nothing where poses near change points stand for them.
+        """
+        values = self._run(self._recorded[2], t, q, v)
+        sizes = np.stack([np.broadcast_to(values[f"size{j}"], len(q)) for j in range(self.k)], axis=1)
+        near = np.array([self._crossing(x) is not None for x in q[:, 0].tolist()])
+        return np.where(np.isfinite(sizes) & ~near[:, None], sizes, 0.0)
 
     def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals) -> Mapping[str, Any]:
         if self.plain:

@@ -20,11 +20,9 @@ from virtualwork.intime.travel import Travel
 # the method's order
 FIRST, COARSE = 0.1, 1e-7
 # what the error of steps half as long is less by, one; of the estimate
-GAIN, SAFETY = 255.0, 10.0
+GAIN, SAFETY, ALONE = 255.0, 4.0, 10.0
 # the tolerance below which steps have errors of rounding alone
 LEAST = 1e-15
-# roundings of the acceleration that all err the same way
-ROUNDINGS = 8.0
 # an error of the inputs beyond which nothing is known of what depends on them
 UNKNOWN = 0.1
 # solutions at most, until the estimate meets the accuracy
@@ -40,13 +38,13 @@ def first_tolerance(accuracy: float, crosses: bool = False) -> float:
     return max(LEAST, FIRST * (accuracy if crosses else min(accuracy, COARSE)))
 
 
-def share(tolerance: float) -> float:
-    """Of the distance of two solutions what the finer may err by; the coarser was made with a tolerance.
+def share(followed: bool) -> float:
+    """Of the distance of two solutions what the finer may err by; less where their distance over each step is `followed` too.
 
-    >>> round(share(1e-9), 4), round(share(1e-14), 2)
-    (0.0392, 0.93)
+    >>> round(share(True), 4), round(share(False), 4)
+    (0.0157, 0.0392)
     """
-    return min(1.0, SAFETY * (1 / GAIN + 4 * EPS / tolerance))
+    return (SAFETY if followed else ALONE) / GAIN
 
 
 def apart(t: Reals, q: Reals, v: Reals) -> Reals:
@@ -66,32 +64,13 @@ def spread(fine: Reals, apart: Reals, of: Any) -> Reals:
     return np.asarray(np.maximum.accumulate(apart * of, axis=-2) + 4 * EPS * np.abs(fine))
 
 
-def rounding(t: Reals, q: Reals, v: Reals, a: Reals) -> Reals:
-    """What rounding of every state and acceleration up to each time may come to, (…, n, k).
-
-    Parameters
-    ----------
-    t : array (…, n)
-    q, v, a : array (…, n, k)
-        The inputs, their speeds and accelerations.
-    """
-    step = np.diff(t, axis=-1)[..., None]
-
-    def summed(x: Reals) -> Reals:
-        parts = 0.5 * (x[..., 1:, :] + x[..., :-1, :]) * step
-        return np.concatenate([np.zeros_like(x[..., :1, :]), np.cumsum(parts, axis=-2)], axis=-2)
-
-    ways = summed(np.abs(v)) + summed(summed(np.abs(a)))
-    return np.asarray(ROUNDINGS * EPS * (np.maximum.accumulate(np.abs(q), axis=-2) + ways))
-
-
 # --- of two solutions ---------------------------------------------------------------------------------------------
 def input_error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
-    """How far the inputs may be from the truth at times, (n, k)."""
+    """How far the inputs may be from the truth at times, (n, k): between two nodes that of the one after both, for in a single step halves gain by chance."""
     nodes = coarse.nodes[coarse.nodes <= fine.end]
-    error = spread(*solutions_apart(fine, coarse, nodes)[:2], part) + unavoidable(fine, nodes)
-    # between two nodes that of the later one
-    return np.asarray(error[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
+    error = spread(*solutions_apart(fine, coarse, nodes)[:2], part) + besides(fine, coarse, nodes, part)
+    after = np.searchsorted(nodes, t)
+    return np.asarray(error[np.minimum(after + (after > 0), len(nodes) - 1)])
 
 
 def solutions_apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, Reals, Reals]:
@@ -100,12 +79,11 @@ def solutions_apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, 
     return q, apart(nodes, q - other, v - rate), np.abs(v - rate)
 
 
+def besides(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
+    """What is off besides a part of their distance, (n, k): for rounding, and where small changes are followed, for their distance over each step."""
+    return np.asarray(fine.grown(t, part if coarse.followed else 0.0) + fine.blur(t)[:, None])
+
+
 def unavoidable(fine: Travel, t: Reals) -> Reals:
     """The error that no shorter steps make smaller, (n, k): rounding, as the motion makes it grow, and interpolation near change points."""
-    return np.maximum(unavoidable_rounding(fine, t), fine.grown(t))
-
-
-def unavoidable_rounding(fine: Travel, t: Reals) -> Reals:
-    """Rounding by itself, and interpolation near change points, (n, k)."""
-    q, v, a, _ = fine.at(t)
-    return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])
+    return np.asarray(fine.grown(t) + fine.blur(t)[:, None])

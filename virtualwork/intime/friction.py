@@ -112,7 +112,7 @@ class Rubbing(Equations):
         return [joint.name for joint, *_ in self._contacts[1]]
 
     @cached_property
-    def _recorded(self) -> tuple[Tape, Tape]:
+    def _recorded(self) -> tuple[Tape, Tape, Tape]:
         recording = self.recording(True, True, False)
         pose, contacts = recording.forces.pose, recording.forces.case.contacts
         rubs = [f"friction {n}" for n in range(len(self.arms))]

@@ -18,7 +18,7 @@ from virtualwork.formulas.positions import unwound
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import TINY, DormandPrince
-from virtualwork.intime.growth import grown
+from virtualwork.intime.growth import Rounded, at_start, differences, flows, free, grown, ways_of
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.marching import Nodes, loop, over
 from virtualwork.intime.watch import Floats
@@ -90,7 +90,8 @@ class Path:
         """Take away a node and all after it, but for the first."""
         del self.rows[max(1, node) :]
         # it is that of every step
-        self.__dict__.pop("noise", None)
+        for kept in ("noise", "_flows"):
+            self.__dict__.pop(kept, None)
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
@@ -153,6 +154,11 @@ class Path:
         """The node before each time."""
         return np.clip(np.searchsorted(self.nodes.t, times, side="right") - 1, 0, self.steps)
 
+    @property
+    def _which(self) -> Any:
+        """The nodes at which rounding is looked at."""
+        return np.unique(np.linspace(0, self.steps, min(SAMPLES, 2 + self.steps // 4)).astype(int))
+
     @cached_property
     def noise(self) -> Reals:
         """The standard deviation of what rounding makes of the accelerations over each step, (n − 1, k), from that at some nodes.
@@ -162,8 +168,7 @@ class Path:
         that is stretched by a millionth of a metre has nine digits fewer.
         """
         nodes, k = self.nodes, self.equations.k
-        which = np.unique(np.linspace(0, self.steps, min(SAMPLES, 2 + self.steps // 4)).astype(int))
-        some = nodes.at(which)
+        which, some = self._which, nodes.at(self._which)
         # at other distances beside every node: whole units of the last place would all round alike
         beside = BESIDE * (1.0 + np.modf(0.618 * np.arange(1, len(which) + 1))[0])[:, None]
         apart = np.arange(-4.0, 5.0)[:, None, None] * (beside * np.array(self.equations.scale))
@@ -186,24 +191,57 @@ class Path:
         h = np.diff(self.nodes.t)[:, None]
         return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
 
-    def grown(self, start: Reals | None) -> tuple[Reals, Reals | None]:
-        """What the motion makes of the rounding of all steps before, (n, k) of the inputs, and the covariance of the last state.
+    @property
+    def _sizes(self) -> Reals:
+        """What the loads add to the accelerations, summed without signs, (k, n), from that at some nodes."""
+        t, some = self.nodes.t, self.nodes.at(self._which)
+        sizes = self.equations.load_sizes(some.t, some.q, some.v)
+        return np.stack([np.interp(t, some.t, of) for of in sizes.T])
 
-        It is not followed, 0 and None, where the motion is not smooth (friction and change points: see `Equations.smooth`), or steps are
-        implicit. `start` is the covariance at the beginning.
+    @property
+    def _stiff(self) -> bool:
+        """Whether what is off shrinks within a step by far."""
+        return self.followed and self.method.stable == np.inf
+
+    @property
+    def followed(self) -> bool:
+        """Whether small changes are followed along the motion, which is smooth (see `Equations.smooth`); those of the inputs, if not."""
+        return self.equations.smooth
+
+    @cached_property
+    def _flows(self) -> tuple[Reals, Reals, Reals]:
+        """The flows of small changes over each step, what rounds at random in it, and what it changes; see `growth.grown`."""
+        nodes, equations, k = self.nodes, self.equations, self.equations.k
+        noise, h = self.noise_of_speeds.T, np.diff(nodes.t)
+        if not self.followed:
+            # nothing pulls back or apart, and all is off one way
+            q, v, a = (x.T for x in self.states(nodes.t)[:3])
+            rates = np.abs(np.concatenate([v, a]))
+            ways = 0.5 * h * (rates[:, 1:] + rates[:, :-1])
+            return free(h, k), noise, np.concatenate([ways, ways_of(h, q, v, self._sizes)[2 * k :]])
+        q, v, a = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k]))
+
+        def many(t: Reals, q: Reals, v: Reals) -> Reals:
+            return equations.many(t, q.T, v.T)[:, :k].T
+
+        flow, rounds = flows(
+            many, np.array(equations.scale), nodes.t, q, v, a, not equations.stops, self._stiff
+        )
+        return flow, np.hypot(noise, rounds), ways_of(h, q, v, self._sizes)
+
+    def grown(self, start: Rounded | None, apart: Reals | None = None) -> tuple[Reals, Rounded]:
+        """How far the inputs may be off for what rounds in all steps before, (n, k), and what has rounded in the last state.
+
+        `start` is that of the first state; `apart` how far another solution lies from the nodes, (2k, n): by how much the two part
+        over each step counts too.
         """
-        nodes, k = self.nodes, self.equations.k
-        if self.method.stable == np.inf or not self.equations.smooth or not self.steps:
-            return np.zeros_like(nodes.q), None if self.steps else start
-
-        def rates(t: Reals, q: Reals, v: Reals) -> Reals:
-            return self.equations.many(t, q.T, v.T)[:, :k].T
-
-        scale = np.array(self.equations.scale)
-        q, v, a, noise = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k], self.noise_of_speeds))
-        seen = None if self.coordinates.own else self.coordinates.seen(nodes.q)
-        size, last = grown(rates, scale, nodes.t, q, v, a, noise, not self.equations.stops, start, seen)
-        return size.T, last
+        nodes = self.nodes
+        start = at_start(nodes.q[0], nodes.v[0]) if start is None else start
+        flow, rounds, ways = self._flows
+        local = None if apart is None else differences(flow, apart)
+        seen = None if self.coordinates.own or not self.followed else self.coordinates.seen(nodes.q)
+        off, last = grown(flow, np.diff(nodes.t), rounds, ways, start, seen, local, self._stiff)
+        return off.T, last
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property

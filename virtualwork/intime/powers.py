@@ -1,4 +1,4 @@
-"""The motion of a recording as tapes: accelerations, the power of what stores nothing, and the energies."""
+"""The motion of a recording as tapes: accelerations, the power of what stores nothing, the energies, and what the accelerations are summed from."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ def state_names(k: int) -> list[str]:
 
 def motion_of(
     recording: Recording, k: int, frictions: Sequence[str] = (), more: Mapping[str, Number] | None = None
-) -> tuple[Tape, Tape]:
-    """The tapes of accelerations and power, and of the energies, of k inputs that move.
+) -> tuple[Tape, Tape, Tape]:
+    """The tapes of accelerations and power, of the energies, and of the sizes of loads, of k inputs that move.
+
+    The sizes are those of what the loads, each by itself, add to each acceleration (`size0` and so on), summed without their signs.
 
     The effort depends linearly on the accelerations and on the inputs `frictions`. With these, the accelerations and
     quantities (`more`) are those without friction, and beside each stands its derivative to each friction: `NAME FRICTION`.
@@ -38,7 +40,7 @@ def motion_of(
 
 def _motion_of(
     recording: Recording, k: int, frictions: Sequence[str], more: Mapping[str, Number]
-) -> tuple[Tape, Tape]:
+) -> tuple[Tape, Tape, Tape]:
     again = recording.recorder
     case, pose = recording.forces.case, recording.forces.pose
     efforts, accelerations = [f"effort {j}" for j in range(k)], names(k)[2][:-1]
@@ -77,4 +79,16 @@ def _motion_of(
     wasted = [(load.wasted(pose, j), speed) for load in loads for j, speed in enumerate(speeds)]
     power = sum((work * speed for work, speed in wasted if work is not None), 0.0)
     potential = sum((load.potential(pose) for load in loads if load.stores and load.carries), 0.0)
-    return again.tape(out | {"power": power}), again.tape({"energy": kinetic + potential})
+    sizes: list[Number] = [0.0] * k
+    for load in loads:
+        by = [] if load.kind.startswith("inertia") else [load.power(pose, j) for j in range(k)]
+        if any(of is not None for of in by):
+            alone = moved([0.0 if of is None else of for of in by])
+            sizes = [size + abs(x) for size, x in zip(sizes, alone, strict=True)]
+    tapes = (
+        out | {"power": power},
+        {"energy": kinetic + potential},
+        {f"size{j}": x for j, x in enumerate(sizes)},
+    )
+    first, energy, size = map(again.tape, tapes)
+    return first, energy, size

@@ -25,12 +25,12 @@ from virtualwork.intime.estimate import (
     LEAST,
     TRIES,
     UNKNOWN,
+    besides,
     first_tolerance,
     input_error,
     share,
     solutions_apart,
     unavoidable,
-    unavoidable_rounding,
 )
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
@@ -124,11 +124,12 @@ class Run:
         t = np.union1d(some, self.t)
         q, gap, faster = solutions_apart(self.fine, self.coarse, t)
         least, gap, faster = (
-            unavoidable(self.fine, t),
+            besides(self.fine, self.coarse, t, self.share),
             *(np.maximum.accumulate(x, axis=0) for x in (gap, faster)),
         )
         shares = self.share + np.divide(least, gap, out=np.zeros_like(gap), where=gap > 0)
-        wrong, rates = np.maximum(gap * shares, least) + 4 * EPS * np.abs(q), faster * shares
+        wrong, rates = gap * self.share + least + 4 * EPS * np.abs(q), faster * shares
+        most = np.minimum(shares.max(axis=1), 1.0)
         units = np.eye(q.shape[1])
         moves = [(wrong * unit, 0.0 * rates) for unit in units] + [
             (0.0 * wrong, rates * unit) for unit in units
@@ -138,7 +139,7 @@ class Run:
         answers, moved = of(self.fine, t, None), [of(self.fine, t, by) for by in moves]
         rows, result = np.searchsorted(t, self.t), []
         for answer, other, *others in zip(answers, of(self.coarse, t, None), *moved, strict=True):
-            error = self.share * np.maximum.accumulate(np.abs(answer - other)) + 4 * EPS * np.abs(answer)
+            error = most * np.maximum.accumulate(np.abs(answer - other)) + 4 * EPS * np.abs(answer)
             off = np.abs(np.array(others) - answer)
             # a quantity rounds by itself, also where it vanishes
             rounded = np.maximum.accumulate(off[-len(ROUNDINGS) :].max(axis=0))
@@ -301,12 +302,15 @@ def _simulated(
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
-        part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(tolerance)
+        part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(coarse.followed)
         times = reached(t, fine.end)
         error = input_error(fine, coarse, times, part)
         worst = float((error / scale).max())
-        least = float((unavoidable_rounding(fine, fine.nodes) / scale).max())
-        if worst <= accuracy or least > accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
+        if worst <= accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
+            break
+        least = float((unavoidable(fine, fine.nodes) / scale).max())
+        if worst <= 2 * least and least <= UNKNOWN:
+            # shorter steps gain little
             break
         tolerance = finer
     if fine.ended == "end" and _arrives(fine, coarse, levels, part):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +16,7 @@ from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
 from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.growth import Rounded
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.sticking import gains, holding, rests
@@ -126,41 +127,38 @@ class Travel:
                 before, place = float(ends[-1]), float(way[-1])
         return np.interp(times, np.concatenate(t), np.concatenate(places))
 
-    def noise(self, times: Reals) -> Reals:
-        """How far the coordinates may be wrong for what rounds in their accelerations, at times between nodes too, (n, k)."""
-        k = self.legs[0].equations.k
-        t, places, place = [self.legs[0].nodes.t[:1]], [np.zeros((1, k))], np.zeros(k)
-        before = np.zeros(k)
-        for leg in self.legs:
-            if leg.steps:
-                h = np.diff(leg.nodes.t)[:, None]
-                squares = before + np.cumsum(leg.noise_of_speeds**2, axis=0)
-                way = place + np.cumsum(np.sqrt(squares) * h, axis=0)
-                t, places = [*t, leg.nodes.t[1:]], [*places, way]
-                before, place = squares[-1], way[-1]
-        nodes, whole = np.concatenate(t), np.concatenate(places)
-        return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
+    @property
+    def followed(self) -> bool:
+        """Whether small changes are followed along all of it, in the inputs, by explicit steps."""
+        leg = self.legs[0]
+        return len(self.legs) == 1 and leg.followed and leg.coordinates.own and leg.method.stable < np.inf
 
-    def grown(self, times: Reals) -> Reals:
-        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k)."""
-        t, largest = (self.coarse or self)._growth
-        return np.stack([np.interp(times, t, of) for of in largest.T], axis=1)
+    def grown(self, times: Reals, share: float = 0.0) -> Reals:
+        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).
 
-    @cached_property
-    def _growth(self) -> tuple[Reals, Reals]:
-        """The times of all nodes, and what the motion makes of rounding up to each, (n, k), through all sets of coordinates."""
-        sizes, spread = [], None
-        for before, leg in zip([None, *self.legs], self.legs, strict=False):
-            if before is not None and spread is not None:
+        With a share of them, by how much the coarse solution parts from this one over each step counts too.
+        """
+        way = self.coarse or self
+        sizes: list[Reals] = []
+        rounded: Rounded | None = None
+        for before, leg in zip([None, *way.legs], way.legs, strict=False):
+            if before is not None and rounded is not None and before.followed and leg.followed:
                 _, q, v, *_ = before.last
-                onto = before.coordinates.onto(leg.coordinates, q, v)
-                spread = onto @ spread @ onto.T
-            size, spread = leg.grown(spread)
+                rounded = rounded.onto(before.coordinates.onto(leg.coordinates, q, v))
+            size, rounded = leg.grown(rounded, share * self._apart(leg) if share else None)
             sizes.append(size)
         largest = np.maximum.accumulate(np.concatenate(sizes), axis=0)
-        return np.concatenate([leg.nodes.t for leg in self.legs]), np.minimum(
-            largest, self.legs[0].equations.scale
-        )
+        largest = np.minimum(largest, self.legs[0].equations.scale)
+        nodes = np.concatenate([leg.nodes.t for leg in way.legs])
+        return np.stack([np.interp(times, nodes, of) for of in largest.T], axis=1)
+
+    def _apart(self, leg: Path) -> Reals:
+        """How far this solution lies from the nodes of a leg of the coarse one, (2k, n); after its end as far as there."""
+        nodes = leg.nodes
+        n = int(np.searchsorted(nodes.t, self.end, side="right"))
+        q, v, *_ = self.at(nodes.t[:n])
+        apart = np.concatenate([q - nodes.q[:n], v - nodes.v[:n]], axis=1).T
+        return np.pad(apart, ((0, 0), (0, len(nodes.t) - n)), mode="edge")
 
     @property
     def halves(self) -> Floats:

@@ -27,8 +27,8 @@ from virtualwork.formulas.numbers import Reals, real_array
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed, sides
-from virtualwork.intime.estimate import GAIN, LEAST, TRIES, apart, first_tolerance, rounding, share, spread
-from virtualwork.intime.growth import grown
+from virtualwork.intime.estimate import GAIN, LEAST, TRIES, apart, first_tolerance, share, spread
+from virtualwork.intime.growth import at_start, differences, flows, grown, ways_of
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
@@ -39,8 +39,8 @@ Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 # steps of one variant; beyond them it is done singly
 MOST = 20_000
-# of the largest speed of a motion: one that comes so near a rest may make rounding grow; steps of which that is computed at a time
-RESTING, HELD = 5e-3, 1 << 16
+# steps of which the growth of rounding is computed at a time
+HELD = 1 << 16
 # rounds between two looks, at first and later
 SOON, LATER = 16, 128
 # the results of each variant over its times
@@ -119,9 +119,9 @@ class Runs:
 class Variants(Family):
     """Variants of a mechanism that can be simulated; `Mechanism.vary` makes them."""
 
-    # what is written down once: the formulas, and the tapes of accelerations and energies
+    # what is written down once: the formulas, and the tapes of accelerations, energies and loads
     alike: Solver | None = None
-    tapes: tuple[Tape, Tape] | None = None
+    tapes: tuple[Tape, Tape, Tape] | None = None
 
     def simulate(
         self,
@@ -215,6 +215,7 @@ class _Lanes:
     written: VariedFormulas
     rates: Tape
     energy: Tape
+    loads: Tape
     given: dict[str, Reals]
     together: Mask
     t: Reals
@@ -249,7 +250,7 @@ class _Lanes:
             except ZeroDivisionError:
                 # no mass moves: each says so
                 return None
-        rates, energy = family.tapes
+        rates, energy, loads = family.tapes
         places, speeds, _ = names(k)
         if not {*places, *speeds, *entering}.issuperset(rates.inputs):
             return None
@@ -258,7 +259,19 @@ class _Lanes:
         if slides:
             scale[:, slides] = np.array([family[i].size for i in range(len(q))])[:, None]
         return cls(
-            family, solver, solver.written, rates, energy, entering, solver.together, t, q, v, scale, levels
+            family,
+            solver,
+            solver.written,
+            rates,
+            energy,
+            loads,
+            entering,
+            solver.together,
+            t,
+            q,
+            v,
+            scale,
+            levels,
         )
 
     @property
@@ -280,7 +293,7 @@ class _Lanes:
             coarse, nodes = nodes, self.halved(rows, nodes)
             times = self.times(rows, nodes, alone)
             past = np.isnan(times)
-            error = self._error(rows, coarse, nodes, times, share(tolerance))
+            error = self._error(rows, coarse, nodes, times)
             error[past] = np.nan
             for j, level in self.levels.items():
                 beside = np.abs(nodes.q[-1, :, j] - level) <= error[:, -1, j]
@@ -359,40 +372,31 @@ class _Lanes:
                     row[: len(its)], row[len(its) :] = its, np.nan
         return result
 
-    def _error(self, rows: Rows, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
-        """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
-        q, v, a = (np.swapaxes(x[::2], 0, 1) for x in (fine.q, fine.v, fine.rates[..., :-1]))
-        gap = apart(coarse.t.T, q - np.swapaxes(coarse.q, 0, 1), v - np.swapaxes(coarse.v, 0, 1))
-        least = np.maximum(rounding(coarse.t.T, q, v, a), self._grown(rows, coarse))
-        result = spread(q, gap, of) + least
+    def _error(self, rows: Rows, coarse: Nodes, fine: Nodes, times: Reals) -> Reals:
+        """The error of the inputs at all times, (lanes, n, k), as `estimate.input_error`."""
+        part, ends = share(True), fine.at(np.s_[::2])
+        q, off, faster = (np.swapaxes(x, 0, 1) for x in (ends.q, ends.q - coarse.q, ends.v - coarse.v))
+        result = spread(q, apart(coarse.t.T, off, faster), part)
+        changes = part * np.concatenate([off, faster], axis=2)
+        for lanes in np.array_split(np.arange(len(rows)), 1 + len(rows) * len(coarse.t) // HELD):
+            result[lanes] += self._grown(rows[lanes], coarse.at(np.s_[:, lanes]), changes[lanes].T)
         at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
-        at = np.minimum(at, len(coarse.t) - 1)
+        at = np.minimum(at + (at > 0), len(coarse.t) - 1)
         return np.asarray(result[np.arange(len(result))[:, None], at])
 
-    def _grown(self, rows: Rows, nodes: Nodes) -> Reals:
-        """What the motions make of rounding, the largest so far, (lanes, rounds, k); 0 of those that never come near a rest.
+    def _grown(self, rows: Rows, nodes: Nodes, changes: Reals) -> Reals:
+        """What the motions make of rounding, and of how two ways part over each step, the largest so far, (lanes, rounds, k)."""
+        scale, h = self.scale[rows].T, np.diff(nodes.t, axis=0)
 
-        Speeds and accelerations along a motion are themselves a solution of the equation of small changes: where they do not
-        shrink far, nothing grows far from there.
-        """
-        scale = self.scale[rows]
-        steps = (np.diff(nodes.t, axis=0) > 0).sum(axis=0)
-        step = (nodes.t[-1] - nodes.t[0]) / np.maximum(steps, 1)
-        moving = ((np.abs(nodes.v) + step[:, None] * np.abs(nodes.rates[..., :-1])) / scale).max(axis=2)
-        near = np.flatnonzero((steps > 0) & (moving.min(axis=0) < RESTING * moving.max(axis=0)))
-        result = np.zeros((len(rows), *nodes.q.shape[::2]))
-        for lanes in np.array_split(near, max(1, len(near) * len(nodes.t) // HELD)) if len(near) else ():
-            part, of = nodes.at(np.s_[:, lanes]), rows[lanes]
+        def of(tape: Tape, q: Reals, v: Reals) -> Reals:
+            flat = (x.reshape(self.k, -1).T for x in (q, v))
+            return self._run(tape, np.tile(rows, q.shape[1]), *flat)[:, : self.k].T.reshape(q.shape)
 
-            def rates(t: Reals, q: Reals, v: Reals, of: Rows = of) -> Reals:
-                flat = (x.reshape(self.k, -1).T for x in (q, v))
-                return self._run(self.rates, np.tile(of, len(t)), *flat)[:, : self.k].T.reshape(q.shape)
-
-            q, v, a = (np.moveaxis(x, -1, 0) for x in (part.q, part.v, part.rates[..., :-1]))
-            size, _ = grown(rates, scale[lanes].T, part.t, q, v, a)
-            size = np.minimum(size, scale[lanes].T[:, None])
-            result[lanes] = np.maximum.accumulate(size, axis=1).T
-        return result
+        q, v, a = (np.moveaxis(x, -1, 0) for x in (nodes.q, nodes.v, nodes.rates[..., :-1]))
+        flow, rounds = flows(lambda t, q, v: of(self.rates, q, v), scale, nodes.t, q, v, a)
+        start, local = at_start(q[:, 0], v[:, 0]), differences(flow, changes)
+        size, _ = grown(flow, h, rounds, ways_of(h, q, v, of(self.loads, q, v)), start, local=local)
+        return np.asarray(np.maximum.accumulate(np.minimum(size, scale[:, None]), axis=1).T)
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""

@@ -357,7 +357,7 @@ def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
     result = []
     for i in np.flatnonzero(true):
         low = float(np.linalg.eigvalsh(hessian[i])[0])
-        least = 1e-9 * max(float(np.abs(hessian[i]).max()), scale * 1e-3)
+        least = 1e-9 * max(float(np.abs(hessian[i]).max()), scale)
         result.append(
             Equilibrium(
                 tuple(float(v) for v in inputs[i]),
