@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -99,3 +101,21 @@ def test_what_a_grade_needs(missing: str, dalembert: Dalembert) -> None:
     done = dalembert("balance", "-", *PLANES, "--grade", "API", *words, stdin=ROTOR)
     assert done.returncode == 2
     assert "--grade needs --speed and --rotor-mass" in " ".join(done.stderr.split())
+
+
+def test_a_pipe_has_the_verdict_of_a_grade_beside_the_corrections(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    """10 g at 20 mm are 200 g·mm; G2.5 of 12 kg at 3000 rpm permits 95.5 g·mm. Steps of 20 g cannot correct them."""
+    (tmp_path / "rotor.csv").write_text("mass_g,radius_mm,angle_deg\n10,20,30\n")
+    words = ("balance", "rotor.csv", "--plane", "A:20mm")
+    grade = ("--grade", "G2.5", "--speed", "3000rpm", "--rotor-mass", "12kg")
+    plain = dalembert(*words)
+    graded = dalembert(*words, *grade)
+    assert graded.stdout == plain.stdout
+    assert "residual_g_mm 0, verdict within" in graded.stderr
+    coarse = dalembert(*words, *grade, "--round-mass", "25g")
+    assert "permissible_g_mm 95.493, initial_g_mm 200, residual_g_mm 200, verdict beyond" in coarse.stderr
+    # the terminal's table and the document have it themselves
+    assert "verdict" not in dalembert(*words, *grade, "--json").stderr
+    assert "note:" not in dalembert(*words, *grade, "--text").stderr

@@ -247,10 +247,8 @@ class Description(Record):
     @cached_property
     def guided(self) -> dict[str, int]:
         """The points that run in guides, each with the number of its guide: of two of them that of the first."""
-        numbers: dict[str, int] = {}
-        for i, guide in enumerate(self.guides):
-            numbers.setdefault(guide.point, i)
-        return numbers
+        numbered = [(guide.point, i) for i, guide in enumerate(self.guides)]
+        return dict(reversed(numbered))
 
     def guide_at(self, point: str | None) -> int:
         """The guide in which a point runs."""
