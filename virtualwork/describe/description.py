@@ -247,8 +247,8 @@ class Description(Record):
     @cached_property
     def guided(self) -> dict[str, int]:
         """The points that run in guides, each with the number of its guide: of two of them that of the first."""
-        numbered = [(guide.point, i) for i, guide in enumerate(self.guides)]
-        return dict(reversed(numbered))
+        points = [guide.point for guide in self.guides]
+        return {point: points.index(point) for point in points}
 
     def guide_at(self, point: str | None) -> int:
         """The guide in which a point runs."""
