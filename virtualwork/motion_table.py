@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from virtualwork.describe.description import Description
+from virtualwork.formulas.kinematics import Angle, Point
 from virtualwork.formulas.poses import Poses
-from virtualwork.quantities import links, points
+from virtualwork.quantities import LINK, POINT
+
+ANGLE = ("angle_rad", *LINK[1:])
 
 
 def columns(poses: Poses) -> dict[str, Any]:
@@ -22,12 +25,16 @@ def columns(poses: Poses) -> dict[str, Any]:
 
 def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
     """Return the columns of links and points that move, up to this order."""
-    free = [name for name in m.points if name not in m.ground]
-    shown = [*links(m.links, orders - 1), *points(m, free, orders - 1)]
-    keys = list(dict.fromkeys(each.key for each in shown))
-    values = dict(zip(keys, poses.values(keys), strict=True))
-    table: dict[str, Any] = {}
-    for each in shown:
-        header = each.header.removesuffix("deg") + "rad" if each.in_degrees else each.header
-        table[header] = each.in_si(values[each.key])
+    links = {f"{name}_{ANGLE[k]}": Angle(name, k) for name in m.links for k in range(orders)}
+    points = [
+        (name, k, Point(body, 0j, name, k))
+        for name, (body, _) in m.points.items()
+        if name not in m.ground
+        for k in range(orders)
+    ]
+    values = iter(poses.values([*links.values(), *(key for *_, key in points)]))
+    table: dict[str, Any] = {header: next(values) for header in links}
+    for (name, k, _), z in zip(points, values, strict=True):
+        x, y = POINT[k]
+        table[f"{name}_{x}"], table[f"{name}_{y}"] = z.real, z.imag
     return table
