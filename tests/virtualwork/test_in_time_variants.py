@@ -33,7 +33,8 @@ def same_as_singly(family: Variants, runs: Runs, apart: float, **start: object) 
             alone = getattr(one, of)
             assert np.abs(getattr(runs, of)[i] - alone).max() <= apart * (1 + np.abs(alone).max())
         assert np.abs(runs.energy[i] - one.energy).max() < 100 * apart
-        assert runs.error_estimate[i] == pytest.approx(one.error_estimate, rel=1e-3, abs=1e-13)
+        # singly what rounds in the accelerations is measured too
+        assert runs.error_estimate[i] == pytest.approx(one.error_estimate, rel=1e-3, abs=2e-13)
         assert runs.warnings.get(i, ()) == one.warnings
 
 
