@@ -34,7 +34,9 @@ def same_as_singly(family: Variants, runs: Runs, apart: float, **start: object) 
             assert np.abs(getattr(runs, of)[i] - alone).max() <= apart * (1 + np.abs(alone).max())
         assert np.abs(runs.energy[i] - one.energy).max() < 100 * apart
         # singly what rounds in the accelerations is measured too
-        assert runs.error_estimate[i] == pytest.approx(one.error_estimate, rel=1e-3, abs=2e-13)
+        lanes, alone = runs.error_estimate[i], one.error_estimate
+        assert (lanes <= 1.001 * alone).all()
+        assert (lanes >= np.where(alone > 1e-11, 0.999, 0.6) * alone).all()
         assert runs.warnings.get(i, ()) == one.warnings
 
 
