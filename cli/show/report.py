@@ -18,7 +18,7 @@ from cli.show.result import BARS_STYLE, Bars, Section, Sheet, finished, way_shee
 from dalembert.errors import DataError
 from dalembert.quantities import is_number, parse_quantity
 from dalembert.results.columns import Column, Table
-from dalembert.results.text import BAD, GOOD, Grid, has_names, heading, in_blocks, printed
+from dalembert.results.text import BAD, GOOD, Grid, has_names, heading, in_blocks, printed, without_noise
 from dalembert.tables.files import load, name_of, named
 from dalembert.tables.sources import open_source
 from dalembert.units import LISTED, parted, written
@@ -221,9 +221,7 @@ def _grids(table: Table) -> Iterator[Part]:
     headers: list[str] = []
     texts: list[list[str]] = []
     for column in table.columns:
-        values = _known(column, kept)
-        if thinned:
-            values = _without_noise(values)
+        values = without_noise(_known(column, kept), column.unit)
         cells = [
             "yes" if v is True else "no" if v is False else t
             for v, t in zip(values, printed(column.header, values), strict=True)
@@ -260,13 +258,6 @@ def _known(column: Column, kept: Sequence[int]) -> list[Cell]:
     return [
         0.0 if isinstance(v, float) and abs(v) <= bounds[i] else v for i, v in zip(kept, values, strict=True)
     ]
-
-
-def _without_noise(values: list[Cell]) -> list[Cell]:
-    """What is within the rounding of the largest of a sweep is nothing."""
-    sizes = [abs(v) for v in values if isinstance(v, float) and v == v]
-    floor = 1e-12 * max(sizes, default=0.0)
-    return [0.0 if isinstance(v, float) and abs(v) < floor else v for v in values]
 
 
 def _words(name: str) -> str:

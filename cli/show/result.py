@@ -300,11 +300,11 @@ def way_text(result: Result, units: str | None, terminal: bool) -> str:
 
 def table_block(table: Table, width: int | None, rows: int | None = None, title: str = "") -> str:
     """Return a table as a terminal shows it, its sentences above and below; of a long one the first rows."""
-    from dalembert.results.text import table_text
+    from dalembert.results.text import table_text, without_noise
 
     if title and table.columns and not table.length:
         return f"{title.removesuffix(':')}: none\n"
-    cells = {header: values[:rows] for header, values in table.cells.items()} if rows else table.cells
+    cells = {column.header: without_noise(column.values, column.unit)[:rows] for column in table.columns}
     more = f"… and {table.length - rows} further rows" if rows and table.length > rows else ""
     parts = (title or table.above, table_text(cells, table.keys, width), more, table.below)
     return "".join(part.rstrip("\n") + "\n" for part in parts if part)

@@ -56,23 +56,29 @@ def plain(value: object) -> str | float:
     return str(value).lower() if isinstance(value, bool) else value  # type: ignore[return-value]
 
 
-NOISE = 1e-14
+def printed(name: str, column: Values) -> list[str]:
+    """Return a column's cells as they are shown: numbers to 6 significant digits."""
+    values = [plain(value) for value in column]
+    return [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
+
+
+NOISE = 1e-12
 """Of the largest number of a column: what is smaller is what rounding left of 0."""
 
 
-def printed(name: str, column: Values) -> list[str]:
-    """Return a column's cells as they are shown: numbers to 6 significant digits, what rounding left of 0 as 0.
+def without_noise(values: Values, unit: str) -> Values:
+    """Return the values of a column as people read them: what rounding left of 0 is 0.
 
-    >>> printed("x_m", [0.04, 2.4e-18]), printed("x_m", [2.4e-18])
-    (['0.04', '0'], ['2.4e-18'])
+    Numbers without a unit may be of several quantities, which say nothing of each other.
+
+    >>> without_noise([0.04, 2.4e-18, None], "m"), without_noise([2.4e-18], "m"), without_noise([4.0, 2.4e-18], "")
+    ([0.04, 0.0, None], [2.4e-18], [4.0, 2.4e-18])
     """
-    values = [plain(value) for value in column]
-    numbers = [abs(value) for value in values if isinstance(value, float) and isfinite(value)]
-    least = NOISE * max(numbers, default=0.0)
-    return [
-        (_six_digits(name, value) if abs(value) >= least else "0") if isinstance(value, float) else str(value)
-        for value in values
-    ]
+    if not unit:
+        return values
+    sizes = [abs(v) for v in values if isinstance(v, float) and isfinite(v)]
+    floor = NOISE * max(sizes, default=0.0)
+    return [0.0 if isinstance(v, float) and abs(v) < floor else v for v in values]
 
 
 def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: int | None = None) -> str:
