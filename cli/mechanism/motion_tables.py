@@ -76,7 +76,8 @@ def columns_of(
     columns = [column("t_s", t.tolist())]
     for each, of in values.items():
         bounds = None if error is None or _is_error(each) else partial(error, each)
-        columns.append(column(each.header, cells(of), bounds))
+        # an error is infinite where no digit holds
+        columns.append(column(each.header, of.tolist() if _is_error(each) else cells(of), bounds))
     return columns
 
 

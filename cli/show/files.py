@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from itertools import count
+from math import isfinite
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -86,7 +87,8 @@ def workbook(tables: Mapping[str, Iterable[Table]]) -> Iterator[bytes]:
     def cell(sheet: Any, value: str | float) -> Any:
         # a number as its text: openpyxl keeps 16 digits of a float; a name that begins with = is no formula
         made = WriteOnlyCell(sheet, value if isinstance(value, str) else repr(value))
-        made.data_type = "s" if isinstance(value, str) else "n"
+        # a workbook has no number for an infinite error
+        made.data_type = "n" if not isinstance(value, str) and isfinite(value) else "s"
         return made
 
     def begun(title: str, table: Table) -> Any:

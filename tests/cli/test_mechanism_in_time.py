@@ -258,7 +258,8 @@ def test_where_no_digit_is_known_cells_are_empty_with_one_warning(
     assert len(lost) == 2 * 3 + 6
     # the energy is known as long as it is kept
     assert float(rows[-1]["energy_J"]) == pytest.approx(float(rows[0]["energy_J"]), abs=1e-6)
-    assert float(rows[-1]["lower_input_error_estimate_deg"]) > 5
+    assert rows[-1]["lower_input_error_estimate_deg"] == "inf"
+    assert 0 < float(rows[1]["lower_input_error_estimate_deg"]) < 1
     assert all(rows[1].values())
     (line,) = done.stderr.splitlines()
     assert "no digit holds from" in line
@@ -266,7 +267,7 @@ def test_where_no_digit_is_known_cells_are_empty_with_one_warning(
         done = dalembert("simulate", pendulum, "--time", "0:60:12", "--json")
         found = json.loads(done.stdout)
         assert found["time"][-1]["inputs"]["lower"]["angle_deg"] is None
-        assert found["time"][-1]["inputs"]["lower"]["error_estimate_deg"] > 5
+        assert found["time"][-1]["inputs"]["lower"]["error_estimate_deg"] is None
         assert len(found["warnings"]) == 1
 
 
@@ -292,3 +293,16 @@ def test_json_with_forces_has_points_and_links_too(dalembert: Dalembert, pendulu
     only = rows("--only", "bob")[-1]
     assert "bob" in only["links"]
     assert "P" not in only.get("points", {})
+
+
+def test_a_workbook_has_the_word_for_an_infinite_error(dalembert: Dalembert, pendulum: Path) -> None:
+    """It has no number for it: Excel would call the file damaged."""
+    from openpyxl import load_workbook
+
+    pendulum.write_text(CHAOS)
+    done = dalembert("simulate", pendulum, "--time", "0:60:30", "--only", "Q", "-o", "c.xlsx", "--json")
+    assert done.returncode == 0, done.stderr
+    (head, *_, last) = load_workbook(pendulum.parent / "c.xlsx").worksheets[0].iter_rows()
+    (cell,) = (c for h, c in zip(head, last, strict=True) if h.value == "lower_input_error_estimate_deg")
+    assert (cell.value, cell.data_type) == ("inf", "s")
+    assert json.loads(done.stdout)["time"][-1]["inputs"]["lower"]["error_estimate_deg"] is None

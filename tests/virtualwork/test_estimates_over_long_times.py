@@ -51,6 +51,26 @@ def test_a_pendulum_of_many_periods(accuracy: float, periods: int, side: int) ->
     assert run.error_estimate[-1, 0] < 50 * error[1:].max()
 
 
+@pytest.mark.parametrize("beside", [1e-9, -1e-9, 1e-7])
+def test_beyond_the_last_digit_the_estimate_is_infinite(beside: float) -> None:
+    """From its upper rest a pendulum turns back there: after the second time two solutions may be whole turns off."""
+    start = math.pi / 2 - beside
+    t = np.linspace(0.0, 40.0, 81)
+    run = pendulum().simulate(t, angle=start)
+    with mp.workdps(40):
+        k, omega = mp.sin((mpf(start) + mp.pi / 2) / 2), mp.sqrt(mpf(G))
+        swings = [2 * mp.asin(k * mp.ellipfun("cd", omega * x, m=k * k)) for x in map(mpf, t.tolist())]
+        exact = [(x if beside > 0 else 2 * mp.pi - x) - mp.pi / 2 for x in swings]
+        error = off(run, exact)
+    estimate = run.error_estimate[:, 0]
+    assert (error <= estimate).all()
+    lost = np.isinf(estimate)
+    assert lost[-1]
+    assert not lost[t < 15].any()
+    assert (np.diff(lost.astype(int)) >= 0).all()
+    assert f"no digit holds from {t[np.argmax(lost)]:g} s on" in run.warnings[0]
+
+
 def wheel(folder: Path, torques: tuple[str, ...]) -> Mechanism:
     path = folder / "wheel.toml"
     loads = "".join(f'[[torques]]\nlink = "wheel"\ntorque = {torque}\n' for torque in torques)

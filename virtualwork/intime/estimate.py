@@ -64,6 +64,15 @@ def spread(fine: Reals, apart: Reals, of: Any) -> Reals:
     return np.asarray(np.maximum.accumulate(apart * of, axis=-2) + 4 * EPS * np.abs(fine))
 
 
+def infinite_where_lost(error: Reals, scale: Reals) -> Reals:
+    """The errors of the inputs, (n, k); infinite where no digit holds, for two solutions that have parted may be whole turns off.
+
+    >>> infinite_where_lost(np.array([[1e-9], [0.5]]), np.array([1.0])).tolist()
+    [[1e-09], [inf]]
+    """
+    return np.where((error / scale).max(axis=-1, keepdims=True) > UNKNOWN, np.inf, error)
+
+
 # --- of two solutions ---------------------------------------------------------------------------------------------
 def input_error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
     """How far the inputs may be from the truth at times, (n, k): between two nodes that of the one after both, for in a single step halves gain by chance."""

@@ -27,6 +27,7 @@ from virtualwork.intime.estimate import (
     UNKNOWN,
     besides,
     first_tolerance,
+    infinite_where_lost,
     input_error,
     share,
     solutions_apart,
@@ -62,7 +63,7 @@ class Run:
     angle, speed, acceleration : array (n, k)
         The inputs (rad, or m of a slide; not wrapped) and their rates.
     error_estimate : array (n, k)
-        How far the inputs may be from the truth.
+        How far the inputs may be from the truth; infinite where no digit holds.
     work : array (n,)
         Of what stores no energy, since the first time, J.
     ended : str
@@ -105,8 +106,7 @@ class Run:
     @property
     def unknown(self) -> NDArray[np.bool_]:
         """(n,): whether no digit of the inputs holds, nor any after that time."""
-        scale = np.array(self.fine.legs[0].equations.scale)
-        return np.asarray((self.error_estimate / scale).max(axis=1) > UNKNOWN)
+        return np.asarray(np.isinf(self.error_estimate).any(axis=1))
 
     def errors(self, of: Callable[[Travel, Reals, Moved | None], Sequence[Reals]]) -> list[Reals]:
         """The errors of quantities at the times, (n,) each: how far those of states lie that are as wrong as these may be.
@@ -316,7 +316,7 @@ def _simulated(
     if fine.ended == "end" and _arrives(fine, coarse, levels, part):
         fine.ended = "until"
     _refuse_lost_energy(fine, max(accuracy, worst))
-    run = Run(assembly, times, *fine.at(times), error, fine, coarse, part)
+    run = Run(assembly, times, *fine.at(times), infinite_where_lost(error, scale), fine, coarse, part)
     return replace(run, warnings=(*equations.warnings, *_warnings(run, accuracy, worst, until, t)))
 
 
