@@ -74,21 +74,21 @@ def bracketed(
     >>> bracketed(lambda x: (np.cos(x), -np.sin(x)), *ends, np.array([1.0, -1.0]), sum(ends) / 2) / np.pi
     array([0.5, 1.5])
     """
-    a, b = low, high
-    for _ in range(HALVINGS):
-        value, slope = at(x)
-        left = np.sign(value) == below
-        a, b = np.where(left, x, a), np.where(left, b, x)
-        step = (a + b) / 2
-        if slope is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):
+    a, b, width = low, high, high - low
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(HALVINGS):
+            value, slope = at(x)
+            left = np.sign(value) == below
+            a, b = np.where(left, x, a), np.where(left, b, x)
+            step = (a + b) / 2
+            if slope is not None:
                 newton = x - value / slope
-            step = np.where((newton > a) & (newton < b), newton, step)
-            step = np.where(value == 0, x, step)
-        near = (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), high - low)).all()
-        x = step
-        if near:
-            break
+                step = np.where((newton > a) & (newton < b), newton, step)
+                step = np.where(value == 0, x, step)
+            near = (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), width)).all()
+            x = step
+            if near:
+                break
     return np.asarray(x)
 
 
