@@ -5,8 +5,9 @@ An unbalance is a complex number m·r·e^{iθ} (kg·m, rad); corrections are wha
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from dalembert.on_use import on_use
 
 if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
@@ -82,19 +83,8 @@ _HOMES = {
     "balancing.trial": "ErrorBudget TrialEffect error_budget trial_effect trial_unbalance",
     "balancing.unbalance": "initial_unbalance",
 }
-_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'balancing' has no attribute '{name}'")
-    value = globals()[name] = getattr(import_module(_HOME[name]), name)
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
-
+__getattr__, __dir__ = on_use(globals(), _HOMES)
 
 __all__ = [
     "GRADES",

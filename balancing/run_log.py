@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -227,7 +227,8 @@ class JointFit:
         of_rows = DOUBLED.sqrt(Doubled(np.swapaxes(weights, -1, -2)))
         ones = Vectors.of(np.ones((*masses.shape[:-1], 1)))
         rows = Vectors.joined([ones, masses], axis=-1)[..., None, :, :] * part(of_rows, (..., None))
-        return smallest_squares(rows, -readings.swapped() * of_rows)[0]
+        by_channel: Any = np.swapaxes(cast("Any", readings), -1, -2)
+        return smallest_squares(rows, -by_channel * of_rows)[0]
 
     def scatter(self) -> Errors:
         """Return the errors of readings as the residuals show them: s/√2 in each component."""

@@ -150,9 +150,9 @@ def pseudo_inverse(a: Vectors) -> Vectors:
         if few == columns:
             inverse[case] = pseudo_inverse(one)
         elif few:
-            left = pseudo_inverse(one[:, _independent(floats[case], few)])
-            right = least_norm(product(left, one)[None], Vectors.of(-np.eye(few))).swapped()
-            inverse[case] = product(right, left)
+            left: Any = pseudo_inverse(one[:, _independent(floats[case], few)])
+            right: Any = least_norm((left @ one)[None], Vectors.of(-np.eye(few)))
+            inverse[case] = np.swapaxes(right, -1, -2) @ left
     return inverse
 
 
@@ -181,13 +181,3 @@ def root_of(covariance: Vectors) -> Vectors:
                 rest = rest.real
             root[..., i, j] = rest / size * some.astype(float)
     return root
-
-
-def product(a: Vectors, b: Vectors) -> Vectors:
-    """Return A B, (..., l, m) and (..., m, n)."""
-    return (a[..., :, :, None] * b[..., None, :, :]).sum(-2)
-
-
-def applied(a: Vectors, x: Vectors) -> Vectors:
-    """Return A x, (..., m, n) and (..., n)."""
-    return (a * x[..., None, :]).sum()

@@ -6,8 +6,9 @@ to space. Products of inertia are +∫ x y dm, and a tensor carries them with th
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from dalembert.on_use import on_use
 
 if TYPE_CHECKING:
     from rigidbody3d.attitude import from_scipy, to_scipy
@@ -38,19 +39,8 @@ _HOMES = {
     "rigidbody3d.shapes": "SHAPES inertia_of load_mesh measure_of mesh",
     "rigidbody3d.top": "Top TopState",
 }
-_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'rigidbody3d' has no attribute '{name}'")
-    value = globals()[name] = getattr(import_module(_HOME[name]), name)
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
-
+__getattr__, __dir__ = on_use(globals(), _HOMES)
 
 __all__ = [
     "SHAPES",

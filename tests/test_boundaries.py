@@ -130,7 +130,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),
-        ("dataclass", "decimals", "errors", "hints", "memory"),
+        ("dataclass", "decimals", "errors", "hints", "memory", "on_use"),
     ),
     "benchmarks": (
         ("__main__", "commands_page", "library_page", "page_pictures", "same_outputs", "trace_passes"),
@@ -148,11 +148,7 @@ PACKAGES = (
     ("dalembert.__init__",),
     ("cli",),
     CORE,
-    ("dalembert.drawing", "dalembert.page", "dalembert.results", "dalembert.tables"),
-    ("dalembert.arithmetic",),
-    ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
-    ("dalembert.units",),
-    ("dalembert.dataclass", "dalembert.decimals", "dalembert.errors", "dalembert.hints", "dalembert.memory"),
+    *(tuple(f"dalembert.{room}" for room in level) for level in LEVELS["dalembert"][1:]),
 )
 
 # What is not yet so, by file. An entry goes when its offence goes; none is added.

@@ -1,7 +1,8 @@
 """Planar mechanisms: kinematics, and equilibrium at rest and in motion by virtual work."""
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from dalembert.on_use import on_use
 
 if TYPE_CHECKING:
     from virtualwork.describe import AssemblyError, DescriptionError, MechanismError, MobilityError
@@ -93,7 +94,7 @@ __all__ = [
 ]
 
 # where each name stands; a room is loaded when one of its names is used
-_ROOMS = {
+_HOMES = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
     "virtualwork.describe.parts": "GROUND Belt Cam Force Friction Gear Guess Guide Input Link Motor Polar Rack Segment Spring Torque TorsionSpring",
     "virtualwork.study.ledger": "ledger",
@@ -111,16 +112,4 @@ _ROOMS = {
     "virtualwork.textbook.newton": "newton",
 }
 
-
-def __getattr__(name: str) -> object:
-    for room, names in _ROOMS.items():
-        if name in names.split():
-            module = import_module(room)
-            value: object = getattr(module, name, None) or import_module(f"{room}.{name}")
-            globals()[name] = value
-            return value
-    raise AttributeError(f"module 'virtualwork' has no attribute '{name}'")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = on_use(globals(), _HOMES)

@@ -282,11 +282,11 @@ def by_owner(analysis: Analysis, table: Table) -> list[Table]:
         if kind == "reactions":
             names |= {"on": [owner[1] for owner in rows], "from": [owner[2] for owner in rows]}
         lead = [Column(name, "", cells) for name, cells in names.items() if cells]
-        made.append(Table([*lead, *(_of_rows(head, list(rows.values())) for head in heads)], [*names]))
+        made.append(Table([*lead, *(of_rows(head, list(rows.values())) for head in heads)], [*names]))
     return made
 
 
-def _of_rows(head: str, rows: Sequence[Mapping[str, Column]]) -> Column:
+def of_rows(head: str, rows: Sequence[Mapping[str, Column]]) -> Column:
     """Return a column of the single cells that some rows have below a header."""
 
     def error() -> list[float]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -182,6 +180,9 @@ def put(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     DataError
         Where the folder cannot be written, or would lose answers that were filled in, or one of the inputs.
     """
+    import shutil
+    import tempfile
+
     _refuse(folder, files)
     parent = folder.parent
     if not parent.is_dir():

@@ -64,9 +64,9 @@ def _other_sense(b: FieldBalancing) -> Iterator[str]:
             )
         if b.request.lagging and not lagged:
             yield (
-                f"{file}: the phases of the runs were reversed, and the file does not state that the phase lagged when its coefficients "
-                "were measured: if the phase of the instrument leads, leave out --phase-lag, or the angles are wrong; if it lagged "
-                "then too, add a column phase_sense with lag to the file"
+                f"{file}: the phases of the runs were reversed, but the file does not say how the phase was counted when its "
+                "coefficients were measured, and the angles may be wrong: if the phase lagged then too, add a column phase_sense "
+                "with the word lag to the file; if the phase of this instrument leads, leave out --phase-lag"
             )
 
 

@@ -29,8 +29,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
 
     ANSWERS is the answers.csv of dalembert exercise, with the column answer filled in. It has the columns student,
-    quantity, answer, unit and those that name the row; further columns are kept. An answer may have a decimal comma, a power of ten and its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle may differ by
-    whole turns. The status is 0 however wrong the answers are.
+    quantity, answer, unit and those that name the row; further columns are kept. An answer may have a decimal comma,
+    a power of ten and its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle may differ by whole turns. The status is 0
+    however wrong the answers are.
     """
     from cli.exercise.description import read_exercise
     from cli.exercise.variants import several, workshop

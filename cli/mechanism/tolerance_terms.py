@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.cases.poses import of_rows
 from dalembert.results.columns import Column, Table, finite, names
 from dalembert.results.way import Topic
 
@@ -25,29 +25,18 @@ def by_quantity(table: Table, shown: Sequence[Component]) -> list[Table]:
     The first has what names the pose.
     """
     columns = {each.header: each for each in table.columns}
-    units: dict[str, list[tuple[str, dict[str, Column]]]] = {}
+    units: dict[str, tuple[list[str], list[dict[str, Column]]]] = {}
     for quantity in shown:
         own = columns[quantity.header]
-        lead = f"{own.name}_"
-        row = {"value": own} | {
-            each.name.removeprefix(lead): each
-            for each in table.columns
-            if isinstance(each.place, tuple) and own.header in each.place
-        }
-        units.setdefault(own.unit, []).append((quantity.names[0] if quantity.names else own.name, row))
-
-    def errors(cells: Sequence[Column]) -> list[float]:
-        return [float("nan") if each.error is None else float(each.error()[0]) for each in cells]
-
+        effects = (c for c in table.columns if isinstance(c.place, tuple) and own.header in c.place)
+        row = {f"value_{own.unit}": own} | {c.header.removeprefix(f"{own.name}_"): c for c in effects}
+        titles, rows = units.setdefault(own.unit, ([], []))
+        titles.append(quantity.names[0] if quantity.names else own.name)
+        rows.append(row)
     made = [Table([each for each in table.columns if each.header in table.keys])]
-    for unit, rows in units.items():
-        lead_column = Column("quantity", "", [name for name, _ in rows])
-        numbers = []
-        for head in rows[0][1]:
-            cells = [row[head] for _, row in rows]
-            error = partial(errors, cells) if cells[0].error is not None else None
-            numbers.append(Column(head, unit, [each.values[0] for each in cells], error))
-        made.append(Table([lead_column, *numbers], ["quantity"]))
+    for titles, rows in units.values():
+        numbers = (of_rows(head, rows) for head in rows[0])
+        made.append(Table([Column("quantity", "", titles), *numbers], ["quantity"]))
     return made
 
 

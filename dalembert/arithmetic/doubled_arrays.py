@@ -331,11 +331,6 @@ class Vectors(NDArrayOperatorsMixin):
         """These numbers again, to be changed."""
         return Vectors.of_parts(*(DoubledArray(x.high.copy(), x.low.copy()) for x in (self.real, self.imag)))
 
-    def swapped(self) -> Vectors:
-        """The vectors with their last two axes exchanged."""
-        parts = ((x.high, x.low + 0.0 * x.high) for x in (self.x, self.y))
-        return Vectors(*(Doubled(*(np.swapaxes(each, -1, -2) for each in pair)) for pair in parts))
-
     def any(self) -> bool:
         """Whether one is not zero."""
         return bool(self.value.any())

@@ -75,6 +75,9 @@ def test_curves_are_the_motion(tmp_path: Path, dalembert: Dalembert) -> None:
     rows = list(csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
     assert list(rows[0]) == ["input_deg", "B_x_mm", "B_y_mm", "C_x_mm", "C_y_mm", "P_x_mm", "P_y_mm"]
     assert len(rows) == 721
+    # degrees as people write them: 60 was 59.99999999999999
+    start = float(rows[0]["input_deg"])
+    assert [float(r["input_deg"]) for r in rows] == [start + k / 2 for k in range(721)]
     m = Mechanism.from_toml_text(FOUR_BAR)
     q = np.radians([float(r["input_deg"]) for r in rows])
     found = np.array([[float(r["P_x_mm"]), float(r["P_y_mm"])] for r in rows])

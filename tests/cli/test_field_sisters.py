@@ -346,7 +346,7 @@ def test_coefficients_of_a_leading_phase_or_of_an_earlier_version(
     stored = (tmp_path / "c.csv").read_text().splitlines()
     assert "phase_sense" not in stored[0]
     (tmp_path / "said.csv").write_text(f"{stored[0]},phase_sense\n{stored[1]},lag\n")
-    unstated = "the file does not state that the phase lagged"
+    unstated = "the file does not say how the phase was counted"
     for file, options, warned in (
         ("c.csv", (), False),
         ("c.csv", ("--rotation", "ccw"), False),
