@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from rigidbody3d.momentum import Motion, Wrench
     from rigidbody3d.parts import read_parts
     from rigidbody3d.percussion import strike
+    from rigidbody3d.robots.inertias import check_inertias
+    from rigidbody3d.robots.reading import read_robot
+    from rigidbody3d.robots.robot import Robot
     from rigidbody3d.shaft import Shaft
     from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
     from rigidbody3d.top import Top, TopState
@@ -35,6 +38,9 @@ _HOMES = {
     "rigidbody3d.momentum": "Motion Wrench",
     "rigidbody3d.parts": "read_parts",
     "rigidbody3d.percussion": "strike",
+    "rigidbody3d.robots.inertias": "check_inertias",
+    "rigidbody3d.robots.reading": "read_robot",
+    "rigidbody3d.robots.robot": "Robot",
     "rigidbody3d.shaft": "Shaft",
     "rigidbody3d.shapes": "SHAPES inertia_of load_mesh measure_of mesh",
     "rigidbody3d.top": "Top TopState",
@@ -48,12 +54,14 @@ __all__ = [
     "FreeBody",
     "FreeState",
     "Motion",
+    "Robot",
     "Shaft",
     "Top",
     "TopState",
     "Trajectory",
     "Wrench",
     "check",
+    "check_inertias",
     "compose",
     "cones",
     "from_scipy",
@@ -66,6 +74,7 @@ __all__ = [
     "principal",
     "products",
     "read_parts",
+    "read_robot",
     "shift",
     "sleeping_threshold",
     "steady_precession",

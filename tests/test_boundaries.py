@@ -69,6 +69,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "virtualwork": (
         ("__init__",),
+        ("exchange",),
         ("mechanism",),
         ("intime",),
         ("motion",),
@@ -89,7 +90,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("parts",),
+        ("parts", "robots"),
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
@@ -126,6 +127,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (
         ("__init__",),
+        ("documents",),
         ("drawing", "page", "results", "tables"),
         ("arithmetic",),
         ("angles", "figures", "quantities"),

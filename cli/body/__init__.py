@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -128,14 +127,12 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
 
 def _inertias(file: str) -> Result:
-    from cli.body.inertias import checks, table, warnings
-    from cli.formats import read_robot
+    from cli.body.inertias import table, warnings
     from cli.show.result import Result
-    from dalembert.tables.files import read_bytes
+    from rigidbody3d import check_inertias, read_robot
 
-    name, data = read_bytes(file)
-    robot = read_robot(name, data, None if file == "-" else Path(file).parent)
-    each = checks(robot)
+    robot = read_robot(file)
+    each = check_inertias(robot)
     return Result(
         tables={"inertias": lambda: table(each)},
         warnings=warnings(robot, each),

@@ -11,7 +11,11 @@ import math
 
 import numpy as np
 
-from cli.formats.drawn import (
+from dalembert.documents.robots import BLOCK
+from dalembert.errors import DataError
+from rigidbody3d.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
+from virtualwork.describe.parts import Gear, Guide, Rack
+from virtualwork.exchange.drawn import (
     GROUND,
     Body,
     Drawing,
@@ -19,13 +23,9 @@ from cli.formats.drawn import (
     Groups,
     Load,
     pins_of,
-    renamed,
     together,
     unused,
 )
-from cli.formats.robot import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
-from dalembert.errors import DataError
-from virtualwork.describe.parts import Gear, Guide, Rack
 
 # two ends of a joint nearer than this share of the robot's size are one place
 SAME = 1e-6
@@ -282,7 +282,9 @@ class _Layer:
 
     def _couplings(self) -> None:
         d = self.d
-        d.gears += [renamed(gear, self.name) for gear in self.robot.gears]
+        for g in self.robot.gears:
+            first, second = map(self.name, g.links)
+            d.gears.append(Gear((first, second), g.ratio, self.name(g.arm)))
         for name, terms in self.robot.couplings:
             if self._rack(terms, name):
                 continue

@@ -14,10 +14,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Groups
-from cli.formats.markup import parse
-from cli.formats.values import LARGEST_FILE, Exact, direction, finite, place
+from dalembert.documents.markup import parse
+from dalembert.documents.values import LARGEST_FILE, finite
 from dalembert.errors import DataError
+from virtualwork.exchange.drawn import GROUND, Drawing, Drive, Groups
+from virtualwork.exchange.places import Exact, direction, place
 
 # numbers of Sketcher's constraints (ConstraintType of its source)
 COINCIDENT, HORIZONTAL, VERTICAL, PARALLEL, TANGENT, DISTANCE, DISTANCE_X, DISTANCE_Y = 1, 2, 3, 4, 5, 6, 7, 8

@@ -12,12 +12,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.formats.drawn import Body
-from cli.formats.markup import add, digits, document
-from cli.read.options import bad
 from dalembert.angles import read_degrees
+from dalembert.documents.markup import add, digits, document
 from dalembert.errors import DataError
-from dalembert.hints import nearest
 from dalembert.results.columns import Column, Table, number
 from dalembert.results.text import csv_text
 from dalembert.units import UNITS, to_si
@@ -25,6 +22,7 @@ from virtualwork.describe.cams import CamDrive
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Line, standing, tracers
+from virtualwork.exchange.drawn import Body
 from virtualwork.formulas.profiles import FINE, ProfilePoint, profile
 from virtualwork.picture.paper import travel_of
 from virtualwork.study.cams import check_cam
@@ -32,7 +30,7 @@ from virtualwork.study.cams import check_cam
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork import Mechanism
+    from virtualwork.mechanism import Mechanism
     from virtualwork.motion import Motion
 
     Array = NDArray[np.float64]
@@ -283,10 +281,14 @@ def unit_of(bare: Mapping[str, str], suffix: str) -> tuple[str, float]:
     return (length, to_si(1.0, "length", length)) if held else ("m", 1.0)
 
 
+class SeveralInputs(DataError):
+    """Curves over the travel of an input, of a mechanism with several inputs."""
+
+
 def curves(travel: Travel, length: str, angle: str) -> bytes:
     """Return the table of the input and of every moving point over its travel, in units of length and angle."""
     if travel.motion is None:
-        raise DataError("curves need one input, and it has several: use `dalembert mechanism --cases`")
+        raise SeveralInputs("curves need one input, and it has several")
     q, slides = travel.motion.inputs[:, 0], travel.m.inputs[0].is_slide
     columns = [number("input", "length", q, length) if slides else _angle("input", q, angle)]
     for name in travel.moving:
@@ -299,24 +301,6 @@ def _angle(name: str, radians: Array, unit: str) -> Column:
     if unit == "rad":
         return Column(name, unit, radians)
     return number(name, "angle", list(map(read_degrees, radians.tolist())), unit)
-
-
-def of_follower(m: Description, name: str) -> CamDrive:
-    """Return the cam that moves a follower, which is named by its sliding point or its arm.
-
-    Raises
-    ------
-    BadParameter
-    """
-    names = {str(cam.slider or cam.follower): number for number, cam in enumerate(m.cams)}
-    if name not in names:
-        expected = (
-            f"one of the followers {', '.join(names)}{nearest(name, names)}"
-            if names
-            else "a mechanism with [[cams]]"
-        )
-        raise bad("--profile", f"'{name}': expected {expected}")
-    return m.cam_drives[names[name]]
 
 
 def cam_bytes(

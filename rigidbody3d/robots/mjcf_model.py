@@ -10,11 +10,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.formats import markup as xml
-from cli.formats.robot import (
+from dalembert.documents import markup as xml
+from dalembert.documents.robots import LIGHT, WORLD
+from dalembert.errors import DataError
+from rigidbody3d.robots.robot import (
     DIAGONAL_FIRST,
-    LIGHT,
-    WORLD,
     Array,
     Inertial,
     Kind,
@@ -25,8 +25,8 @@ from cli.formats.robot import (
     pose,
     printed,
     rotation,
+    stated,
 )
-from dalembert.errors import DataError
 from rigidbody3d.turning import along, turned
 
 if TYPE_CHECKING:
@@ -369,7 +369,7 @@ class Ties:
     def _spring(self, e: Element, at: xml.At) -> None:
         """Read a tendon that pulls: between two sites, or on joints."""
         values = self.defaults.whole(e, kind="tendon")
-        lost = xml.stated([values.get("range")], values.get("frictionloss"))
+        lost = stated([values.get("range")], values.get("frictionloss"))
         if lost:
             self.robot.notes.append(f"{at.where}: its {' and '.join(lost)} are left out")
         stiffness, damping = leading(at, values, "stiffness", "damping")

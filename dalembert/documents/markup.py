@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, tostring
@@ -13,7 +13,7 @@ from xml.parsers.expat.errors import codes
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.formats.values import LARGEST_FILE, MOST_PARTS, check_count, damaged, finite
+from dalembert.documents.values import MOST_PARTS, check_count, check_size, damaged, finite
 from dalembert.errors import DataError
 from dalembert.tables.files import load
 
@@ -30,8 +30,7 @@ def parse(file: str, data: bytes, most: int = MOST_PARTS) -> Element:
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
-    if len(data) > LARGEST_FILE:
-        raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
+    check_size(file, data)
     data = _in_utf_8(data)
     try:
         try:
@@ -113,12 +112,6 @@ def text(element: Element | None, *path: str) -> str | None:
     """Return the text at the end of such a path, without the blanks around it; None where there is none."""
     result = child(element, *path)
     return None if result is None or result.text is None else result.text.strip()
-
-
-def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
-    """Name the further data of a joint: limits and friction that are present and not zero."""
-    result = {"limits": list(limits), "friction": [friction]}
-    return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
 
 
 def passed_over(root: Element, known: Mapping[str, str]) -> list[str]:
@@ -227,11 +220,6 @@ def digits(*values: float) -> str:
     '0.1 0.0 1.0'
     """
     return " ".join(repr(float(v) + 0.0) for v in values)
-
-
-def spatial(z: complex) -> str:
-    """Return a place of the plane as one of space."""
-    return digits(z.real, z.imag, 0.0)
 
 
 def add(parent: Element, tag: str, text: str | None = None, **attributes: str | float) -> Element:

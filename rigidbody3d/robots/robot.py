@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.formats.markup import At
-from cli.formats.values import MOST_LINKS, check_count
+from dalembert.documents.markup import At
+from dalembert.documents.robots import WORLD
+from dalembert.documents.values import MOST_LINKS, check_count
 from dalembert.errors import DataError
 from dalembert.figures import last_place
 from rigidbody3d.turning import turned
 
 if TYPE_CHECKING:
-    from virtualwork.describe.meshes import Gear
+    from rigidbody3d.body import Body
 
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]
-WORLD = "world"
-# how mechanisms call it; who reads a robot alone loads none
-GROUND = "ground"
-# of the heaviest link: the mass of a link without mass, where a format requires one
-LIGHT = 1e-6
-# how the massless bodies are called that slots become
-BLOCK = "block "
 PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-# the orders in which formats and tables print a tensor: URDF, SDF; MJCF
-ROWS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+# the order in which MJCF and tables print a tensor
 DIAGONAL_FIRST = tuple(PLACES)
 
 
@@ -60,6 +53,15 @@ class RobotLink:
     points: dict[str, Array] = field(default_factory=dict)
     shapes: list[tuple[Array, float]] = field(default_factory=list)
 
+    @property
+    def body(self) -> Body | None:
+        """Its mass, centre of mass and inertia tensor in its own axes; None where the file gives none."""
+        from rigidbody3d.body import Body
+        from rigidbody3d.inertia import turn
+
+        held = self.inertial
+        return held and Body(np.asarray(held.mass), held.pose[:3, 3], turn(held.tensor, held.pose[:3, :3]))
+
 
 @dataclass
 class RobotJoint:
@@ -81,6 +83,15 @@ class RobotJoint:
     damping: float = 0.0
     type: str = ""
     more: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """Two links whose turns against an arm have a fixed ratio: ω_second − ω_arm = ratio·(ω_first − ω_arm)."""
+
+    links: tuple[str, str]
+    ratio: float
+    arm: str
 
 
 @dataclass
@@ -116,7 +127,7 @@ class Robot:
     links: dict[str, RobotLink] = field(default_factory=dict)
     joints: dict[str, RobotJoint] = field(default_factory=dict)
     couplings: list[tuple[str, list[tuple[str, float]]]] = field(default_factory=list)
-    gears: list[Gear] = field(default_factory=list)
+    gears: list[Gearbox] = field(default_factory=list)
     motors: list[Motor] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
     ground: str = WORLD
@@ -192,6 +203,12 @@ def rotation(at: At, wxyz: Sequence[float]) -> Array:
     from rigidbody3d.attitude import to_matrix
 
     return np.asarray(to_matrix(wxyz) / np.dot(wxyz, wxyz))
+
+
+def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
+    """Name the further data of a joint: limits and friction that are present and not zero."""
+    result = {"limits": list(limits), "friction": [friction]}
+    return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
 
 
 def half_unit(word: str) -> float:

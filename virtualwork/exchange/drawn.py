@@ -13,10 +13,11 @@ from fractions import Fraction
 from itertools import product
 from typing import Generic, TypeVar
 
-from cli.formats.values import ORIGIN, Exact, apart, coordinates, direction, exact
+from dalembert.documents.values import exact
 from dalembert.units import to_si
 from virtualwork.describe.parts import GROUND as GROUND
 from virtualwork.describe.parts import Gear, Guide, Rack
+from virtualwork.exchange.places import ORIGIN, Exact, apart, coordinates, direction
 
 # places nearer than this share of the drawing's size are one place
 SAME = 1e-9
@@ -107,6 +108,8 @@ class Drawing:
     welds: list[tuple[str, str]] = field(default_factory=list)
     gravity: tuple[float, float] | None = None
     notes: list[str] = field(default_factory=list)
+    refused: str = ""
+    """Why no mechanism can be made of its description; empty where one can."""
 
     @property
     def metres(self) -> float:

@@ -1,12 +1,8 @@
-"""What the files of other programs hold: so much at most, finite numbers, and decimals that stay exact.
-
-Coordinates that a file gives as decimals are exact fractions, so that the difference of two of them is rounded once.
-"""
+"""What a file of another program holds: text, a JSON document, so much at most, finite numbers; errors name the place."""
 
 from __future__ import annotations
 
-import cmath
-import math
+import json
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +15,12 @@ LARGEST_FILE = 10_000_000
 MOST_PARTS = 20_000
 # links of a mechanism or a robot
 MOST_LINKS = 1000
+
+
+def check_size(file: str, data: bytes) -> None:
+    """Refuse a file that is too large."""
+    if len(data) > LARGEST_FILE:
+        raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
 
 
 def check_count(file: str, count: int, what: str, most: int = MOST_PARTS) -> None:
@@ -42,43 +44,37 @@ def values_in(document: Any) -> int:
     return count
 
 
-class Exact(complex):
-    """A place x + iy whose coordinates are exact fractions; the difference of two such places is exact too.
-
-    >>> a, b = place(0.3, 0), place(0.1, 0)
-    >>> (a - b).real, complex(0.3) - complex(0.1)
-    (0.2, (0.19999999999999998+0j))
-    """
-
-    x: Fraction
-    y: Fraction
-
-    def __new__(cls, x: Fraction, y: Fraction) -> Exact:
-        """Return a place from its two coordinates."""
-        z = super().__new__(cls, float(x), float(y))
-        z.x, z.y = x, y
-        return z
-
-    def __sub__(self, other: complex) -> complex:
-        """Return the way from another place."""
-        if isinstance(other, Exact):
-            return Exact(self.x - other.x, self.y - other.y)
-        return complex(self) - other
-
-    def __eq__(self, other: object) -> bool:
-        """Compare exactly, where both are exact."""
-        return (self.x, self.y) == (other.x, other.y) if isinstance(other, Exact) else complex(self) == other
-
-    # equal fractions are equal floats
-    __hash__ = complex.__hash__
+def decoded(file: str, data: bytes) -> str | None:
+    """Return a file's text, None where it is binary; DataError where the file is too large."""
+    check_size(file, data)
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("cp1252", errors="replace")
+    return None if "\0" in text else text
 
 
-ORIGIN = Exact(Fraction(0), Fraction(0))
+def parsed(file: str, text: str) -> Any:
+    """Return a JSON document; DataError names the line and column of what is wrong."""
 
+    def refuse(word: str) -> float:
+        raise DataError(f"{file}: found {word}, expected finite numbers")
 
-def coordinates(z: complex) -> tuple[Fraction, Fraction]:
-    """Return the exact coordinates of a place; floats stand for their shortest decimals."""
-    return (z.x, z.y) if isinstance(z, Exact) else (exact(z.real), exact(z.imag))
+    try:
+        result = json.loads(text, parse_constant=refuse)
+    except json.JSONDecodeError as error:
+        raise DataError(
+            f"{file}: line {error.lineno}, column {error.colno}: no valid JSON ({error.msg}); is the file cut off?"
+        ) from None
+    except (RecursionError, ValueError):
+        raise DataError(
+            f"{file}: no valid JSON: nested too deeply, or a number of thousands of digits"
+        ) from None
+    check_count(file, values_in(result), "values")
+    return result
 
 
 def exact(value: float) -> Fraction:
@@ -90,11 +86,6 @@ def exact(value: float) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise ValueError(f"found {value!r}, expected a finite number")
     return Fraction(repr(value))
-
-
-def place(x: float, y: float) -> Exact:
-    """Return the place of two decimals; ValueError where one is no finite number."""
-    return Exact(exact(x), exact(y))
 
 
 def damaged(file: str, where: str, value: object, expected: str) -> DataError:
@@ -120,14 +111,3 @@ def objects(file: str, where: str, value: Any) -> list[dict[str, Any]]:
     if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
         raise damaged(file, where, value, "a list of objects")
     return value
-
-
-def apart(a: complex, b: complex) -> float:
-    """Return the distance of two places."""
-    way = b - a
-    return math.hypot(way.real, way.imag)
-
-
-def direction(a: complex, b: complex) -> float:
-    """Return the direction from one place to another, degrees from the x-axis."""
-    return math.degrees(cmath.phase(b - a))

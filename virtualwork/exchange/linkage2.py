@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from html import unescape
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Groups, centers, unused
-from cli.formats.values import MOST_PARTS, Exact, apart, check_count, damaged, direction, exact, finite
+from dalembert.documents.values import MOST_PARTS, check_count, damaged, exact, finite
 from dalembert.errors import DataError
 from virtualwork.describe.parts import Gear, Guide
+from virtualwork.exchange.drawn import GROUND, Drawing, Drive, Groups, centers, unused
+from virtualwork.exchange.places import Exact, apart, direction
 
 ATTRIBUTE = re.compile(r"""([A-Za-z_][\w.-]*)\s*=\s*("[^"<]*"|'[^'<]*')""")
 DEEPEST = 20

@@ -6,10 +6,11 @@ import cmath
 import math
 from typing import Any
 
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Load, pins_of, together
-from cli.formats.values import Exact, apart, coordinates, damaged, exact, objects, place
+from dalembert.documents.values import damaged, exact, objects
 from dalembert.errors import DataError
 from virtualwork.describe.parts import Guide
+from virtualwork.exchange.drawn import GROUND, SAME, Body, Drawing, Drive, Load, pins_of, together
+from virtualwork.exchange.places import Exact, apart, coordinates, place
 
 # type -> the table here, the keys of its bodies and of its points on them, and of its numbers
 LOADS: dict[str, tuple[str, tuple[tuple[str, str | None], ...], tuple[str, ...]]] = {

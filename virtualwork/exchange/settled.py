@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from cli.formats.description import parts_of
-from cli.formats.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, together
-from cli.formats.values import ORIGIN, apart
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
+from virtualwork.exchange.description import parts_of
+from virtualwork.exchange.drawn import GROUND, SAME, Body, Drawing, Drive, Groups, together
+from virtualwork.exchange.places import ORIGIN, apart
 from virtualwork.formulas.constraints import Constraints
 
 # below this share a row of speeds follows from others: a file's decimals are fewer than ours

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from cli.formats.drawn import GROUND, Body, Drawing, Load, unused
-from cli.formats.values import ORIGIN, Exact, coordinates, exact
-from virtualwork import Mechanism
+from dalembert.documents.values import exact
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Guess, Input, Link
 from virtualwork.describe.text import AsWritten, Table, document, written
+from virtualwork.exchange.drawn import GROUND, Body, Drawing, Load, unused
+from virtualwork.exchange.places import ORIGIN, Exact, coordinates
+from virtualwork.mechanism import Mechanism
 from virtualwork.motion import Motion
 
 
@@ -162,7 +163,7 @@ LITTLE = 1e-3
 
 
 def described(d: Drawing, source: str) -> str:
-    """Return the TOML text of a drawing, and note on the drawing what does not hold."""
+    """Return the TOML text of a drawing, and note on the drawing what does not hold, or why it is refused."""
     if not d.posed:
         _seek(d, source)
     made = text(d, source)
@@ -191,7 +192,7 @@ def described(d: Drawing, source: str) -> str:
                 f"{point} is {off:.3g} m away from its drawn place: the pose is singular, or nearly"
             )
     except (MechanismError, np.linalg.LinAlgError) as error:
-        d.notes.append(f"`dalembert mechanism` will refuse it: {error}")
+        d.refused = str(error)
     return made
 
 

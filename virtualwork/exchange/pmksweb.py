@@ -16,9 +16,10 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from urllib.parse import unquote
 
-from cli.formats.drawn import GROUND, Drawing, Drive, Load
-from cli.formats.values import Exact, damaged, direction, finite, place
+from dalembert.documents.values import damaged, finite
 from dalembert.errors import DataError
+from virtualwork.exchange.drawn import GROUND, Drawing, Drive, Load
+from virtualwork.exchange.places import Exact, direction, place
 
 # a link of before 2022
 LISTED = re.compile(r"(^|[?&/])j=.*&l=", re.DOTALL)

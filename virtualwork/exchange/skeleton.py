@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cli.formats.drawing import Travel, bodies_of, start_of
-from cli.formats.drawn import Body, Groups, unused
-from cli.formats.robot import BLOCK, WORLD
+from dalembert.documents.markup import digits
+from dalembert.documents.robots import BLOCK, WORLD
 from dalembert.errors import DataError
 from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import hull
+from virtualwork.exchange.drawing import Travel, bodies_of, start_of
+from virtualwork.exchange.drawn import Body, Groups, unused
 from virtualwork.parts_of_motion import SlideMotion
 
 if TYPE_CHECKING:
-    from virtualwork import Mechanism
+    from virtualwork.mechanism import Mechanism
 
 # half the thickness of a link's strokes, of the mechanism's size
 THICK = 0.008
@@ -340,6 +341,11 @@ class Skeleton:
         if m.gravity and "gravity" not in holds:
             result.append("gravity is left out: the format has none")
         return result
+
+
+def spatial(z: complex) -> str:
+    """Return a place of the plane as one of space."""
+    return digits(z.real, z.imag, 0.0)
 
 
 def _spanning(nodes: Iterable[str], pairs: list[tuple[str, str]]) -> list[int]:

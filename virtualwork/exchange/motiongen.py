@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.formats.drawn import GROUND, Drawing, Drive
-from cli.formats.values import Exact, damaged, direction, exact, objects, place
+from dalembert.documents.values import damaged, exact, objects
 from dalembert.errors import DataError
 from virtualwork.describe.parts import Guide
+from virtualwork.exchange.drawn import GROUND, Drawing, Drive
+from virtualwork.exchange.places import Exact, direction, place
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
 # what is read of a document, and what only describes it

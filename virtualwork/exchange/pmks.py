@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import unquote
 
-from cli.formats.drawn import GROUND, Body, Drawing, Drive, centers
-from cli.formats.values import Exact, apart, damaged, direction, finite, place
+from dalembert.documents.values import damaged, finite
 from dalembert.errors import DataError, quote
 from virtualwork.describe.parts import Gear, Rack
+from virtualwork.exchange.drawn import GROUND, Body, Drawing, Drive, centers
+from virtualwork.exchange.places import Exact, apart, direction, place
 
 TYPES = ("R", "P", "RP", "G")
 GROUNDS = {"gnd", "grnd", "grond", "gound", "groud", "0"}
