@@ -335,9 +335,9 @@ def tops(tree: ast.Module) -> set[str]:
 
 @pytest.mark.parametrize("package", CORE)
 def test_core_packages_stand_alone(package: str) -> None:
-    # pandas only for to_frame, never its reader; trimesh is the extra `mesh`, matplotlib the extra `plot`
+    # pandas only for to_frame, never its reader; trimesh is the extra `mesh`, matplotlib `plot`, ezdxf `cad`
     allowed = set(sys.stdlib_module_names) | {package, "dalembert", "numpy", "scipy", "pandas", "trimesh"}
-    allowed |= {"matplotlib", "mpl_toolkits"}
+    allowed |= {"matplotlib", "mpl_toolkits", "ezdxf"}
     for module, tree in trees().items():
         if module.startswith(f"{package}."):
             assert tops(tree) <= allowed, f"{module}: {tops(tree) - allowed}"

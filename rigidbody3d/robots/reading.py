@@ -44,7 +44,7 @@ def read_robot(path: str | Path) -> Robot:
     ...     _ = file.write_text(f'<robot name="r"><link name="arm"><inertial>{inertial}</inertial></link></robot>')
     ...     robot = read_robot(file)
     >>> robot.links["arm"].body
-    <Body: 2 kg at [0.1 0. 0. ] m, principal moments [1. 2. 3.] kg·m²>
+    <Body: 2 kg at [0.1 0 0] m, principal moments [1 2 3] kg·m²>
     """
     name = str(path)
     file, data = read_bytes(name)
