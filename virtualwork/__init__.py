@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         TorsionSpring,
     )
     from virtualwork.exchange.export import export_mechanism
-    from virtualwork.exchange.programs import ImportedMechanism, read_drawing
+    from virtualwork.exchange.programs import ImportedMechanism, import_mechanisms
     from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
     from virtualwork.mechanism import Mechanism
@@ -88,11 +88,11 @@ __all__ = [
     "crank_rod_piston",
     "export_mechanism",
     "grashof_class",
+    "import_mechanisms",
     "ledger",
     "newton",
     "on_incline",
     "on_moving_ramp",
-    "read_drawing",
     "rotation",
     "second_point",
     "sense",
@@ -107,7 +107,7 @@ _HOMES = {
     "virtualwork.motion": "Motion",
     "virtualwork.study": "counterweights",
     "virtualwork.exchange.export": "export_mechanism",
-    "virtualwork.exchange.programs": "ImportedMechanism read_drawing",
+    "virtualwork.exchange.programs": "ImportedMechanism import_mechanisms",
     "virtualwork.family.keep": "Bound",
     "virtualwork.family.target": "Target",
     "virtualwork.study.check": "Check grashof_class",

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dalembert.documents.robots import Robot
 from dalembert.errors import DataError
 from dalembert.results.columns import Table, names, number, vector
+from rigidbody3d.robots.elements import PLACES
 from rigidbody3d.robots.inertias import InertiaCheck
-from rigidbody3d.robots.robot import PLACES, Robot
 
 
 def table(every: Sequence[InertiaCheck]) -> Table:

@@ -1,4 +1,4 @@
-"""`dalembert import`: mechanisms of other programs. Drawings are read by `virtualwork`, robots by `rigidbody3d`, which `plane` lays into their plane."""
+"""`dalembert import`: mechanisms of other programs. Drawings are read by `virtualwork`, robots by `rigidbody3d`."""
 
 from __future__ import annotations
 
@@ -49,8 +49,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     name, data, path = opened(options.file)
     program, drawings = read(name, data, options.kind, path and path.parent)
-    mend = ": give it an actuator on a joint that can move" if program in FORMATS else ""
-    result, lost = mechanisms_of(name, program, drawings, path.stem if path else "", mend)
+    result, lost = mechanisms_of(name, program, drawings, path)
     several = len(result) > 1
     if several and options.output is None:
         raise bad(
@@ -108,17 +107,16 @@ def _pages(title: str, taken: list[str], made: ImportedMechanism) -> list[Sheet]
 
 def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -> tuple[str, list[Drawing]]:
     """Return the kind and the drawings of a file; files that it includes must lie in its folder."""
-    from cli.formats import plane
-    from dalembert.documents.values import MOST_LINKS, check_count
     from rigidbody3d.robots import reading
     from virtualwork.exchange import programs
+    from virtualwork.exchange.planar_robot import ImpossibleInertia
 
     try:
         kind = programs.program_of(file, data, kind, ROOTS)
+        if kind not in FORMATS:
+            return kind, programs.read(file, data, kind)
+        return kind, [programs.planar(reading.read(file, data, folder))]
     except programs.UnknownProgram:
         raise DataError(f"{programs.unknown(file, KINDS)}; name it with --from") from None
-    if kind not in FORMATS:
-        return kind, programs.read(file, data, kind)
-    drawing = plane.drawing(reading.read(file, data, folder))
-    check_count(file, len(drawing.bodies), "links", MOST_LINKS)
-    return kind, [drawing]
+    except ImpossibleInertia as error:
+        raise DataError(f"{error}: see `dalembert body --check-inertias`") from None

@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.documents.robots import ROWS
+from dalembert.documents.robots import ROWS, Inertial, Robot, RobotLink
 from rigidbody3d import inertia
-from rigidbody3d.robots.robot import DIAGONAL_FIRST, PLACES, Inertial, Robot, RobotLink, symmetric
+from rigidbody3d.robots.elements import DIAGONAL_FIRST, PLACES, symmetric
+
+if TYPE_CHECKING:
+    from rigidbody3d.body import Body
 
 Array = NDArray[np.float64]
 
@@ -167,6 +170,31 @@ def _spread(tensor: Array) -> float:
     return float(moments[2] / max(moments[0], 1e-300))
 
 
+def link_body(link: RobotLink) -> Body | None:
+    """Return the mass, centre of mass and inertia tensor of a robot's link in its own axes; None where the file gives none.
+
+    Parameters
+    ----------
+    link : RobotLink
+        One of the `links` of a robot; its `pose` (4, 4) places these axes in the world.
+
+    Examples
+    --------
+    >>> from dalembert.documents.robots import Inertial, RobotLink
+    >>> at = np.eye(4)
+    >>> at[:3, 3] = 0.1, 0.0, 0.0
+    >>> tensor = np.diag([1.0, 2.0, 3.0])
+    >>> link_body(RobotLink("arm", np.eye(4), Inertial(2.0, at, tensor, np.zeros((3, 3)))))
+    <Body: 2 kg at [0.1 0 0] m, principal moments [1 2 3] kg·m²>
+    """
+    from rigidbody3d.body import Body
+
+    held = link.inertial
+    if held is None:
+        return None
+    return Body(np.asarray(held.mass), held.pose[:3, 3], inertia.turn(held.tensor, held.pose[:3, :3]))
+
+
 def check_inertias(robot: Robot) -> list[InertiaCheck]:
     """Return the check of every link whose tensor a robot's file gives.
 
@@ -188,7 +216,7 @@ def check_inertias(robot: Robot) -> list[InertiaCheck]:
 
     Examples
     --------
-    >>> from rigidbody3d.robots.robot import Inertial
+    >>> from dalembert.documents.robots import Inertial, Robot, RobotLink
     >>> tensor = np.diag([1.23, 0.0123, 0.0131])
     >>> arm = RobotLink("arm", np.eye(4), Inertial(1.0, np.eye(4), tensor, np.full((3, 3), 0.00005)))
     >>> (check,) = check_inertias(Robot("arm.urdf", "", {"arm": arm}))

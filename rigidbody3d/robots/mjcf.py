@@ -9,16 +9,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from dalembert.documents import markup as xml
-from dalembert.documents.robots import WORLD
+from dalembert.documents.robots import WORLD, Array, Kind, Robot, RobotJoint, RobotLink
+from rigidbody3d.robots.elements import pose
 from rigidbody3d.robots.mjcf_model import Defaults, Frames, Masses, Ties, leading
-from rigidbody3d.robots.robot import (
-    Array,
-    Kind,
-    Robot,
-    RobotJoint,
-    RobotLink,
-    pose,
-)
 
 INSIDE = (
     "inertial joint freejoint geom site body frame camera light replicate attach composite flexcomp plugin"

@@ -11,22 +11,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from dalembert.documents import markup as xml
-from dalembert.documents.robots import LIGHT, WORLD
+from dalembert.documents.robots import LIGHT, WORLD, Array, Inertial, Kind, Motor, Robot, RobotJoint, Spring
 from dalembert.errors import DataError
-from rigidbody3d.robots.robot import (
-    DIAGONAL_FIRST,
-    Array,
-    Inertial,
-    Kind,
-    Motor,
-    Robot,
-    RobotJoint,
-    Spring,
-    pose,
-    printed,
-    rotation,
-    stated,
-)
+from rigidbody3d.robots.elements import DIAGONAL_FIRST, pose, printed, rotation, stated
 from rigidbody3d.turning import along, turned
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from dalembert.errors import DataError
 from dalembert.tables.files import read_bytes
 
 if TYPE_CHECKING:
-    from rigidbody3d.robots.robot import Robot
+    from dalembert.documents.robots import Robot
 
 FORMATS = {"urdf": "URDF robot", "sdf": "SDF model", "mjcf": "MuJoCo's MJCF"}
 # outermost element -> the format
@@ -28,7 +28,8 @@ def read_robot(path: str | Path) -> Robot:
     -------
     Robot
         `links` and `joints` by name, in SI and rad, as they stand in the file's own configuration; `notes` of what was not
-        imported. `links[name].pose` (4, 4) places a link in the world, `links[name].body` is its mass, centre and tensor.
+        imported. `links[name].pose` (4, 4) places a link in the world; `link_body` returns its mass, centre and tensor.
+        `virtualwork.import_mechanisms` makes mechanisms of a planar robot.
 
     Raises
     ------
@@ -43,8 +44,8 @@ def read_robot(path: str | Path) -> Robot:
     ...     file = Path(folder, "arm.urdf")
     ...     _ = file.write_text(f'<robot name="r"><link name="arm"><inertial>{inertial}</inertial></link></robot>')
     ...     robot = read_robot(file)
-    >>> robot.links["arm"].body
-    <Body: 2 kg at [0.1 0 0] m, principal moments [1 2 3] kg·m²>
+    >>> robot.links["arm"].pose[:3, 3], robot.links["arm"].inertial.mass
+    (array([0., 0., 0.]), 2.0)
     """
     name = str(path)
     file, data = read_bytes(name)
@@ -66,6 +67,9 @@ def read(file: str, data: bytes, folder: Path | None) -> Robot:
     if kind is None:
         expected = ", ".join(f"<{tag}> ({name.upper()})" for tag, name in ROOTS.items())
         raise DataError(f"{file}: found <{root.tag}>, expected {expected}")
-    if kind == "urdf":
-        return urdf.read(file, root)
-    return sdf.read(file, root) if kind == "sdf" else mjcf.read(file, root, folder)
+    if kind == "mjcf":
+        robot = mjcf.read(file, root, folder)
+    else:
+        robot = (urdf if kind == "urdf" else sdf).read(file, root)
+    robot.format = kind
+    return robot

@@ -7,9 +7,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from dalembert.documents import markup as xml
-from dalembert.documents.robots import INERTIA_ALONE, MASSLESS, POINT_MASS, ROWS, WORLD
-from dalembert.errors import DataError
-from rigidbody3d.robots.robot import (
+from dalembert.documents.robots import (
+    INERTIA_ALONE,
+    MASSLESS,
+    POINT_MASS,
+    ROWS,
+    WORLD,
     Array,
     Gearbox,
     Inertial,
@@ -17,12 +20,9 @@ from rigidbody3d.robots.robot import (
     Robot,
     RobotJoint,
     RobotLink,
-    pose,
-    printed,
-    rotation,
-    rpy,
-    stated,
 )
+from dalembert.errors import DataError
+from rigidbody3d.robots.elements import pose, printed, rotation, rpy, stated
 
 KINDS: dict[str, Kind] = {
     "revolute": "turn",

@@ -8,22 +8,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from dalembert.documents import markup as xml
-from dalembert.documents.robots import ROWS
+from dalembert.documents.robots import ROWS, Array, Inertial, Kind, Robot, RobotJoint, RobotLink
 from dalembert.errors import DataError
 from rigidbody3d.robots import sdf
-from rigidbody3d.robots.robot import (
-    Array,
-    Inertial,
-    Kind,
-    Robot,
-    RobotJoint,
-    RobotLink,
-    pose,
-    printed,
-    rpy,
-    sphere_around,
-    stated,
-)
+from rigidbody3d.robots.elements import pose, printed, rpy, sphere_around, stated
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
 # tag -> the tags in it that are read, or that say nothing of a mechanism

@@ -1,4 +1,4 @@
-"""Which program a drawing is of, and its mechanisms; `read_drawing` is the door of a notebook."""
+"""Which program a drawing is of, and its mechanisms; `import_mechanisms` is the door of a notebook."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dalembert.errors import DataError
 from dalembert.tables.files import read_bytes
 
 if TYPE_CHECKING:
+    from dalembert.documents.robots import Robot
     from virtualwork.exchange.drawn import Drawing
     from virtualwork.mechanism import Mechanism
 
@@ -50,15 +51,17 @@ class ImportedMechanism:
         return Mechanism.from_toml_text(self.toml)
 
 
-def read_drawing(source: str | Path, program: str | None = None) -> list[ImportedMechanism]:
-    """Read the mechanisms of another program's file or link; a drawing may hold several.
+def import_mechanisms(source: str | Path | Robot, program: str | None = None) -> list[ImportedMechanism]:
+    """Read the mechanisms of another program's file or link, or of a planar robot; one source may hold several.
 
     Parameters
     ----------
-    source : str or Path
-        The file, or a link that itself holds the mechanism: nothing is fetched from the network.
+    source : str, Path or Robot
+        The file; a link that itself holds the mechanism (nothing is fetched from the network); a robot of
+        `rigidbody3d.read_robot`, which is laid into the plane in which all its joints move.
     program : str, optional
-        `pmks-text`, `pmks-web`, `motiongen`, `linkage`, `linkage_sim` or `freecad`; recognized by the content where it is None.
+        The program of a file or link: `pmks-text`, `pmks-web`, `motiongen`, `linkage`, `linkage_sim` or `freecad`;
+        recognized by the content where it is None.
 
     Returns
     -------
@@ -68,35 +71,37 @@ def read_drawing(source: str | Path, program: str | None = None) -> list[Importe
     Raises
     ------
     DataError
-        The file cannot be read, its program is not recognized, or nothing in it is driven by an input.
+        The file cannot be read, its program is not recognized, the robot is not planar, or nothing is driven by an input.
     ValueError
         Another `program`.
 
     Notes
     -----
     Lengths are differences of the file's own decimals, rounded once. The imported mechanism is assembled again and
-    compared with the drawing, point by point. Robots (URDF, SDF, MJCF) are read by `rigidbody3d.read_robot`.
+    compared with the drawing, point by point.
 
     Examples
     --------
-    >>> (four_bar,) = read_drawing(
+    >>> (four_bar,) = import_mechanisms(
     ...     "http://pmks.example/?mech=ground input R 0 0 0 ffft|input rod R 0 2|rod rocker R 3 4|rocker ground R 4 0"
     ... )
     >>> four_bar.notes
     ('the file has no unit of length: numbers are taken as metres',)
-    >>> four_bar.mechanism.motion(four_bar.mechanism.at[0]).point("J3").position.round(12)
+    >>> four_bar.mechanism.motion(0.0).point("J3").position.round(12)
     array([[3., 4.]])
     """
     if program is not None and program not in PROGRAMS:
         raise ValueError(f"program '{program}': expected one of {', '.join(PROGRAMS)}")
-    file, data, path = opened(str(source))
-    try:
-        program = program_of(file, data, program)
-    except UnknownProgram as error:
-        raise DataError(f"{error}; name it with `program`") from None
-    drawings = read(file, data, program)
-    mechanisms, lost = mechanisms_of(file, program, drawings, "" if path is None else path.stem)
-    return [replace(m, notes=(*lost, *m.notes)) for m in mechanisms]
+    if isinstance(source, str | Path):
+        file, data, path = opened(str(source))
+        try:
+            program = program_of(file, data, program)
+        except UnknownProgram as error:
+            raise DataError(f"{error}; name it with `program`") from None
+        made, lost = mechanisms_of(file, program, read(file, data, program), path)
+    else:
+        made, lost = mechanisms_of(source.file, source.format, [planar(source)], Path(source.file))
+    return [replace(m, notes=(*lost, *m.notes)) for m in made]
 
 
 def opened(source: str) -> tuple[str, bytes, Path | None]:
@@ -107,19 +112,16 @@ def opened(source: str) -> tuple[str, bytes, Path | None]:
 
 
 def mechanisms_of(
-    file: str, program: str, drawings: list[Drawing], stem: str = "", advice: str = ""
+    file: str, program: str, drawings: list[Drawing], path: Path | None
 ) -> tuple[list[ImportedMechanism], list[str]]:
-    """Return the mechanisms of a file's drawings, and notes of what belongs to none.
-
-    `stem` names drawings without a name; `advice` follows the error of a file in which nothing is driven.
-    """
+    """Return the mechanisms of a file's drawings, and notes of what belongs to none; the path names what has no name."""
     from virtualwork.exchange.description import described
     from virtualwork.exchange.settled import settle
 
     result: list[ImportedMechanism] = []
     lost: list[str] = []
     for d in drawings:
-        d.name = d.name or stem
+        d.name = d.name or (path.stem if path else "")
         parts = settle(d)
         lost += d.notes
         for k, part in enumerate(parts, 1):
@@ -127,9 +129,24 @@ def mechanisms_of(
             text = described(part, f"imported from {program}")
             result.append(ImportedMechanism(part.name, text, tuple(part.notes), part.refused))
     if not result:
-        nothing = f"{file}: no mechanism: nothing in it is driven by an input{advice}"
+        # a drawing's first joint that can move drives where the program says none
+        mend = "" if program in PROGRAMS else ": give it an actuator on a joint that can move"
+        nothing = f"{file}: no mechanism: nothing in it is driven by an input{mend}"
         raise DataError("; ".join([nothing, *lost]))
     return result, lost
+
+
+def planar(robot: Robot) -> Drawing:
+    """Return a robot in the plane in which it moves.
+
+    Raises
+    ------
+    DataError
+        It is not planar, or too large.
+    """
+    from virtualwork.exchange import planar_robot
+
+    return _checked(robot.file, [planar_robot.drawing(robot)])[0]
 
 
 # --- which program a file is of -----------------------------------------------------------------------------------
@@ -220,7 +237,12 @@ def read(file: str, data: bytes, program: str) -> list[Drawing]:
     """
     from virtualwork.exchange import freecad
 
-    drawings = freecad.read(file, data) if program == "freecad" else _drawings(file, data, program)
+    return _checked(
+        file, freecad.read(file, data) if program == "freecad" else _drawings(file, data, program)
+    )
+
+
+def _checked(file: str, drawings: list[Drawing]) -> list[Drawing]:
     for d in drawings:
         check_count(file, len(d.bodies), "links", MOST_LINKS)
     return drawings

@@ -11,9 +11,8 @@ import math
 
 import numpy as np
 
-from dalembert.documents.robots import BLOCK
+from dalembert.documents.robots import BLOCK, Motor, Robot, RobotJoint, RobotLink, Spring
 from dalembert.errors import DataError
-from rigidbody3d.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring, plane_of
 from virtualwork.describe.parts import Gear, Guide, Rack
 from virtualwork.exchange.drawn import (
     GROUND,
@@ -26,9 +25,14 @@ from virtualwork.exchange.drawn import (
     together,
     unused,
 )
+from virtualwork.exchange.plane import plane_of
 
 # two ends of a joint nearer than this share of the robot's size are one place
 SAME = 1e-6
+
+
+class ImpossibleInertia(DataError):
+    """A link whose inertia no body has; a check of the file's inertias names the likely mistake."""
 
 
 def drawing(robot: Robot) -> Drawing:
@@ -39,7 +43,7 @@ def drawing(robot: Robot) -> Drawing:
 class _Layer:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.d = Drawing(name=robot.name, angle="rad", own_axes=True, notes=robot.notes)
+        self.d = Drawing(name=robot.name, angle="rad", own_axes=True, notes=list(robot.notes))
 
     def drawing(self) -> Drawing:
         robot, d = self.robot, self.d
@@ -125,9 +129,9 @@ class _Layer:
             return
         mass, center, inertia = together(parts)
         if inertia < 0:
-            raise DataError(
+            raise ImpossibleInertia(
                 f"{self.robot.file}: link '{links[0].name}', inertia about the plane's normal: found {inertia:g}, "
-                "expected zero or more: see `dalembert body --check-inertias`"
+                "expected zero or more"
             )
         body.mass, body.center, body.inertia = mass, self._place(center), inertia
 
