@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rigidbody3d.momentum import Motion, Wrench
     from rigidbody3d.parts import read_parts
     from rigidbody3d.percussion import strike
-    from rigidbody3d.robots.inertias import check_inertias, link_body
+    from rigidbody3d.robots.inertias import check_robot_inertias, link_body
     from rigidbody3d.robots.reading import read_robot
     from rigidbody3d.shaft import Shaft
     from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
@@ -39,7 +39,7 @@ _HOMES = {
     "rigidbody3d.momentum": "Motion Wrench",
     "rigidbody3d.parts": "read_parts",
     "rigidbody3d.percussion": "strike",
-    "rigidbody3d.robots.inertias": "check_inertias link_body",
+    "rigidbody3d.robots.inertias": "check_robot_inertias link_body",
     "rigidbody3d.robots.reading": "read_robot",
     "rigidbody3d.shaft": "Shaft",
     "rigidbody3d.shapes": "SHAPES inertia_of load_mesh measure_of mesh",
@@ -61,7 +61,7 @@ __all__ = [
     "Trajectory",
     "Wrench",
     "check",
-    "check_inertias",
+    "check_robot_inertias",
     "compose",
     "cones",
     "from_scipy",

@@ -129,10 +129,10 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 def _inertias(file: str) -> Result:
     from cli.body.inertias import table, warnings
     from cli.show.result import Result
-    from rigidbody3d import check_inertias, read_robot
+    from rigidbody3d import check_robot_inertias, read_robot
 
     robot = read_robot(file)
-    each = check_inertias(robot)
+    each = check_robot_inertias(robot)
     return Result(
         tables={"inertias": lambda: table(each)},
         warnings=warnings(robot, each),

@@ -114,7 +114,7 @@ class Spring:
 
 @dataclass
 class Robot:
-    """A robot of a file, in SI and rad; `couplings` are sums of joint coordinates that stay as they are."""
+    """A robot of a file, in SI and rad: links, joints, motors, springs; `couplings` are sums of joint coordinates that stay as they are."""
 
     file: str
     name: str

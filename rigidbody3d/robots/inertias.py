@@ -195,7 +195,7 @@ def link_body(link: RobotLink) -> Body | None:
     return Body(np.asarray(held.mass), held.pose[:3, 3], inertia.turn(held.tensor, held.pose[:3, :3]))
 
 
-def check_inertias(robot: Robot) -> list[InertiaCheck]:
+def check_robot_inertias(robot: Robot) -> list[InertiaCheck]:
     """Return the check of every link whose tensor a robot's file gives.
 
     Parameters
@@ -219,7 +219,7 @@ def check_inertias(robot: Robot) -> list[InertiaCheck]:
     >>> from dalembert.documents.robots import Inertial, Robot, RobotLink
     >>> tensor = np.diag([1.23, 0.0123, 0.0131])
     >>> arm = RobotLink("arm", np.eye(4), Inertial(1.0, np.eye(4), tensor, np.full((3, 3), 0.00005)))
-    >>> (check,) = check_inertias(Robot("arm.urdf", "", {"arm": arm}))
+    >>> (check,) = check_robot_inertias(Robot("arm.urdf", "", {"arm": arm}))
     >>> check.valid, check.likely, check.nearest.diagonal().round(4)
     (False, 'a slipped decimal in ixx', array([0.8285, 0.4138, 0.4146]))
     """

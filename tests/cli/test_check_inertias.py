@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigidbody3d.robots.inertias import InertiaCheck, check_inertias
+from rigidbody3d.robots.inertias import InertiaCheck, check_robot_inertias
 from rigidbody3d.robots.reading import read as read_robot
 from tests.conftest import Dalembert
 
@@ -26,7 +26,7 @@ def link(entries: str, mass: str = "1", more: str = "", at: str = "0 0 0") -> st
 
 
 def only(text: str) -> InertiaCheck:
-    (found,) = check_inertias(read_robot("file", text.encode(), None))
+    (found,) = check_robot_inertias(read_robot("file", text.encode(), None))
     return found
 
 

@@ -109,7 +109,7 @@ class Drawing:
     gravity: tuple[float, float] | None = None
     notes: list[str] = field(default_factory=list)
     refused: str = ""
-    """Why no mechanism can be made of its description; empty where one can."""
+    """Why its description has no motion; empty where it moves."""
 
     @property
     def metres(self) -> float:

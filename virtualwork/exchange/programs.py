@@ -35,7 +35,7 @@ NO_ROOTS: Mapping[str, str] = MappingProxyType({})
 class ImportedMechanism:
     """A mechanism read from another program's file: its name, its TOML text, and notes of what was not imported.
 
-    `refused` says why no `Mechanism` can be made of the text; it is empty where one can.
+    `refused` says why it has no motion, such as a free degree of freedom; it is empty where it moves.
     """
 
     name: str
@@ -45,7 +45,7 @@ class ImportedMechanism:
 
     @property
     def mechanism(self) -> Mechanism:
-        """The mechanism, in SI; MechanismError where it is refused."""
+        """The mechanism, in SI; MechanismError, here or on its first motion, where it is refused."""
         from virtualwork.mechanism import Mechanism
 
         return Mechanism.from_toml_text(self.toml)
