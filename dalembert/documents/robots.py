@@ -34,7 +34,7 @@ MASSLESS, POINT_MASS, INERTIA_ALONE = "massless", "point_mass", "inertia_alone"
 class Inertial:
     """Mass and inertia tensor of a link; `pose` are the tensor's axes at the centre of mass, in the link's axes.
 
-    `half` is half a unit of each entry's last printed digit; `entries` are their names in the file.
+    `half` is half a unit of each entry's last printed digit.
     """
 
     mass: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,4 +144,23 @@ def test_what_cannot_be_written_leaves_no_file(tmp_path: Path, dalembert: Dalemb
     )
     with pytest.raises(ValueError, match=r"'a\.step': expected a name that ends in \.dxf"):
         export_mechanism(Mechanism.from_toml(arm), "a.step")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"at": [1.0, 2.0]}, "at: found 2 values, expected one for each input: crank"),
+        ({"at": []}, "at: found 0 values, expected one for each input: crank"),
+        ({"length": "mmm"}, "length: 'mmm' is no unit of length; did you mean 'mm'"),
+        ({"angle": "mm"}, "angle: 'mm' is no unit of angle"),
+    ],
+)
+def test_arguments_that_fit_no_mechanism_are_refused(
+    wrong: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    m = Mechanism.from_toml_text(FOUR_BAR)
+    for suffix in (".csv", ".svg", ".xml"):
+        with pytest.raises(ValueError, match=message):
+            export_mechanism(m, tmp_path / f"a{suffix}", **wrong)
     assert not list(tmp_path.iterdir())

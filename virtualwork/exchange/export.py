@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dalembert.hints import nearest
+from dalembert.units import UNITS
+
 if TYPE_CHECKING:
     from virtualwork.mechanism import Mechanism
 
@@ -48,7 +51,7 @@ def export_mechanism(
     Raises
     ------
     ValueError
-        Another suffix.
+        Another suffix or unit, or another number of inputs.
     DataError, MechanismError
         It cannot be assembled there; curves of several inputs; DXF without the extra `cad`. Nothing is written.
 
@@ -69,11 +72,17 @@ def export_mechanism(
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise ValueError(f"'{path}': expected a name that ends in {', '.join(FORMATS)}")
+    for kind, unit in (("length", length), ("angle", angle)):
+        if unit not in UNITS[kind]:
+            raise ValueError(f"{kind}: '{unit}' is no unit of {kind}{nearest(unit, UNITS[kind])}")
     if at is None:
         own = zip(mechanism.inputs, mechanism.at, strict=True)
         inputs = [guess if e.value is None else e.value for e, guess in own]
     else:
         inputs = [at] if isinstance(at, int | float) else list(at)
+    if len(inputs) != len(mechanism.inputs):
+        names = ", ".join(e.name for e in mechanism.inputs)
+        raise ValueError(f"at: found {len(inputs)} values, expected one for each input: {names}")
     data, notes = file_bytes(
         mechanism, tuple(map(float, inputs)), suffix, "", {"length": length, "angle": angle}
     )

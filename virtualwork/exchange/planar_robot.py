@@ -287,8 +287,8 @@ class _Layer:
     def _couplings(self) -> None:
         d = self.d
         for g in self.robot.gears:
-            first, second = map(self.name, g.links)
-            d.gears.append(Gear((first, second), g.ratio, self.name(g.arm)))
+            a, b = map(self.name, g.links)
+            d.gears.append(Gear((a, b), g.ratio, self.name(g.arm)))
         for name, terms in self.robot.couplings:
             if self._rack(terms, name):
                 continue

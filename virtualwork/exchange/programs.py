@@ -262,5 +262,6 @@ def _drawings(file: str, data: bytes, program: str) -> list[Drawing]:
         return pmks.read(file, parsed(file, text) if text.lstrip()[:1] in ("{", "[") else text)
     if program == "pmks-web":
         return pmksweb.read(file, text)
-    document = parsed(file, text)
-    return (motiongen if program == "motiongen" else linkage_sim).read(file, document)
+    if program == "motiongen":
+        return motiongen.read(file, parsed(file, text))
+    return linkage_sim.read(file, parsed(file, text))
