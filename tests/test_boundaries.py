@@ -126,7 +126,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (
         ("__init__",),
-        ("drawing", "page", "results", "tables"),
+        ("results",),
+        ("drawing", "page", "tables"),
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),

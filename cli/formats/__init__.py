@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cli.formats.drawn import Drawing
     from cli.formats.robot import Robot
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Sheet
+    from dalembert.results.result import Result, Sheet
 
 # kinds of files, as --from names them
 KINDS = {
@@ -61,7 +61,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.formats.description import described
     from cli.formats.settled import settle
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     link = LINK.match(options.file) is not None
     name, data = ("the link", options.file.encode()) if link else read_bytes(options.file)
@@ -121,8 +121,8 @@ def _pages(title: str, taken: list[str], made: str) -> list[Sheet]:
     import tomllib
 
     from cli.cases.picture import posed
-    from cli.show.report import CODE
-    from cli.show.result import Section, Sheet
+    from dalembert.results.report import CODE
+    from dalembert.results.result import Section, Sheet
     from virtualwork import Mechanism, MechanismError
 
     first = Section("Imported", taken)

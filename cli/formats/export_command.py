@@ -14,7 +14,7 @@ from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Sheet
+    from dalembert.results.result import Result, Sheet
     from virtualwork import Mechanism
 
 FORMATS = {
@@ -55,7 +55,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.cases.cases import load
     from cli.cases.inputs import of_one
     from cli.formats.drawing import cam_bytes, of_follower
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.tables.files import name_of
     from virtualwork import MechanismError
 
@@ -83,7 +83,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     def sheets() -> list[Sheet]:
         from cli.cases.picture import posed
-        from cli.show.result import Section
+        from dalembert.results.result import Section
 
         whole = [] if notes else ["Nothing is left out."]
         first = Section("Written", [f"{output.name}: {FORMATS[suffix]}, {len(data)} bytes", *whole])
