@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from balancing.synchronous import OncePerTurn
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
     from dalembert.tables.table import Table as ReadTable
 
@@ -46,7 +46,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     FILE has the columns t_*, mark (once per turn; tacho, keyphasor, pulse and trigger are other names) and a column of
     vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
     """
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     read = read_recording(options.recording, options.pulses)
 

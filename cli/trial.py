@@ -13,9 +13,9 @@ from dalembert.units import G0
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
+    from dalembert.results.result import Result
 
 
 RULE = "centrifugal force a tenth of the static load of each plane: m r ω² = 0.1 (M/planes) g"
@@ -34,7 +34,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     Its centrifugal force is a tenth of the static load of each plane.
     """
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     mass = needed("--rotor-mass", options.rotor_mass, "mass", positive=True)
     omega = needed("--speed", options.speed, "speed", positive=True)

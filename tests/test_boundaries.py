@@ -127,8 +127,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (
         ("__init__",),
-        ("documents",),
-        ("drawing", "page", "results", "tables"),
+        ("documents", "results"),
+        ("drawing", "page", "tables"),
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from cli.read.rotor_options import Planes
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
 
 
@@ -68,7 +68,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     from cli.balance.rotors import Balancing, Carried, Request, read_rotors
     from cli.balance.tables import METHOD, MODAL, tables, warnings
     from cli.read.rotor_options import from_options, from_table, tolerance_of
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     if (options.plane is None) == (options.planes is None):
         raise bad("--plane", "expected --plane (once or more) or --planes FILE.csv")

@@ -12,7 +12,7 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from cli.body.moving import ShaftRequest
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
 
 
@@ -57,8 +57,8 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
-    from cli.read.root_search import pair
-    from cli.show.result import Result, with_found
+    from cli.read.root_search import pair, with_found
+    from dalembert.results.result import Result
     from rigidbody3d.parts import read_bodies, read_table
 
     request = Request(
@@ -128,7 +128,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
 def _inertias(file: str) -> Result:
     from cli.body.inertias import table, warnings
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from rigidbody3d import check_robot_inertias, read_robot
 
     robot = read_robot(file)

@@ -15,11 +15,11 @@ from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import AtOnce, Case, Study, like
 from cli.cases.inputs import Inputs
-from cli.show.result import Result, Section, Sheet
 from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
+from dalembert.results.result import Result, Section, Sheet
 from dalembert.results.text import heading
 from virtualwork.formulas.forces import Effort, NewtonEuler
 from virtualwork.formulas.loops import Column, Margin, Size
@@ -252,7 +252,7 @@ class PoseStudy(Study):
         show = self.show
         self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
-    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+    def page(self, cases: Sequence[tuple[str, Case]], units: Mapping[str, str] | None) -> bytes:
         """Return the page on which every mechanism moves."""
         from cli.cases.picture import page
 

@@ -11,7 +11,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 OPTIONS = """
@@ -40,7 +40,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.engine.cylinders import Engine, read_cylinders, read_shafts
     from cli.engine.tables import METHOD, draw, tables, warnings, way
     from cli.read.rotor_options import from_options
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     if options.speed is None:
         raise bad("--speed", "expected the speed of the crankshaft, such as --speed 3000rpm")

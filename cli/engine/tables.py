@@ -9,12 +9,11 @@ import numpy as np
 
 from balancing.engine import Forces, piston_orders
 from cli.engine.cylinders import Engine
-from cli.show.picture import blank
 from dalembert.angles import degrees
 from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.amounts import prefixed
 from dalembert.drawing.polar import head
-from dalembert.drawing.sheet import plain, sheet
+from dalembert.drawing.sheet import blank, plain, sheet
 from dalembert.results.columns import Column, Table, computed, names, number
 from dalembert.results.way import Topic, figures
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cli.exercise.description import Exercise
     from cli.exercise.sheets import Student
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 OPTIONS = """
@@ -64,7 +64,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise.sheets import answers_csv, filled, key_table, sheet_page, solutions
     from cli.exercise.variants import several, variants, workshop
     from cli.show.output import options_of
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.text import csv_text
 
     if not options.folder:

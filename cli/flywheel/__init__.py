@@ -12,7 +12,7 @@ from dalembert.quantities import parse_number
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 OPTIONS = """
@@ -48,7 +48,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     or 0 to 720 deg of a four-stroke engine. The load is constant, the mean of the torque.
     """
     from cli.flywheel.turns import METHOD, draw, read_torque, tables, warnings, way
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     if options.speed is None or options.fluctuation is None:
         missing = "--speed" if options.speed is None else "--fluctuation"

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.flywheel import TorqueCycle, torque_cycle
-from cli.show.picture import blank
 from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.curves import Curve, panel, spread
-from dalembert.drawing.sheet import sheet
+from dalembert.drawing.sheet import blank, sheet
 from dalembert.errors import DataError
 from dalembert.figures import last_place
 from dalembert.results.columns import Table, computed, names, number

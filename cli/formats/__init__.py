@@ -14,7 +14,7 @@ from virtualwork.exchange.programs import PROGRAMS
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Sheet
+    from dalembert.results.result import Result, Sheet
     from virtualwork.exchange.drawn import Drawing
     from virtualwork.exchange.programs import ImportedMechanism
 
@@ -44,7 +44,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     parallel to the ground's; links of a robot keep their own axes. Standard error names what was not imported.
     Several mechanisms in one file become FILE-1.toml, FILE-2.toml and so on.
     """
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from virtualwork.exchange.programs import mechanisms_of, opened
 
     name, data, path = opened(options.file)
@@ -91,8 +91,8 @@ def _pages(title: str, taken: list[str], made: ImportedMechanism) -> list[Sheet]
     import tomllib
 
     from cli.cases.picture import posed
-    from cli.show.report import CODE
-    from cli.show.result import Section, Sheet
+    from dalembert.results.report import CODE
+    from dalembert.results.result import Section, Sheet
     from virtualwork import MechanismError
 
     first = Section("Imported", taken)

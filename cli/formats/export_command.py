@@ -13,7 +13,7 @@ from virtualwork.exchange.export import FORMATS
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Sheet
+    from dalembert.results.result import Result, Sheet
     from virtualwork.describe.cams import CamDrive
     from virtualwork.describe.description import Description
 
@@ -45,7 +45,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.cases.axes import grids
     from cli.cases.cases import load
     from cli.cases.inputs import of_one
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.tables.files import name_of
     from virtualwork import MechanismError
     from virtualwork.exchange.drawing import SeveralInputs, cam_bytes
@@ -77,7 +77,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     def sheets() -> list[Sheet]:
         from cli.cases.picture import posed
-        from cli.show.result import Section
+        from dalembert.results.result import Section
 
         whole = [] if notes else ["Nothing is left out."]
         first = Section("Written", [f"{output.name}: {FORMATS[suffix]}, {len(data)} bytes", *whole])

@@ -10,7 +10,7 @@ from cli.show.output import show
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 OPTIONS = """
@@ -36,7 +36,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise.description import read_exercise
     from cli.exercise.variants import several, workshop
     from cli.grade.marks import METHOD, mark_all, read_students, tables
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     with workshop(read_exercise(options.file)) as shop:
         exercise = shop.exercise

@@ -10,7 +10,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 OPTIONS = """
@@ -30,7 +30,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     counted in one common sense from the mandrel's zero mark; the rotor's angle is that of its position turned = 0.
     """
     from cli.index.positions import METHOD, draw, read_positions, tables, warnings, way
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     positions = read_positions(options.readings, options.phase_lag)
 

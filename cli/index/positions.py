@@ -276,7 +276,7 @@ def way(p: Positions) -> list[Topic]:
 def draw(p: Positions) -> Figure:
     """Draw the readings, their residuals, and the two parts."""
     from balancing.picture import indexed
-    from cli.show.picture import blank
+    from dalembert.drawing.sheet import blank
 
     figure = blank()
     indexed(

@@ -17,7 +17,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 # -- the options that several of them take ----------------------------------------------------------------------
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.poses import Reals
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from cli.place.placing import Drill
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
 
 
@@ -60,7 +60,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """
     from cli.place.placing import Placing, Request, read_corrections
     from cli.place.tables import METHOD, draw, tables, way
-    from cli.show.result import Result, Section, Sheet
+    from dalembert.results.result import Result, Section, Sheet
     from dalembert.results.text import heading
 
     every = read_corrections(options.corrections, options.rotor, options.plane)

@@ -12,8 +12,8 @@ from balancing import drill_depth
 from balancing.picture import Places, places
 from balancing.weights import angles_again
 from cli.place.placing import Drill, Placed, Placing, Share
-from cli.show.picture import blank
 from dalembert.angles import degrees, phasor
+from dalembert.drawing.sheet import blank
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures, vector_text
 from dalembert.units import from_si

@@ -419,3 +419,13 @@ def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
             expected = "text in quotes, or a date" if key == "date" else "text in quotes"
             raise DataError(f"{file}: [report] {key}: found {toml_text(value)}, expected {expected}")
     return {key: str(value) for key, value in result.items()}
+
+
+def refuse_long(count: int) -> None:
+    """Refuse --page of more poses than a page can hold."""
+    from dalembert.page import fits
+
+    try:
+        fits(count)
+    except ValueError as error:
+        raise bad("--page", str(error)) from None

@@ -11,7 +11,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 OPTIONS = """
@@ -43,10 +43,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     """
     import numpy as np
 
-    from cli.read.root_search import pair
-    from cli.show.result import Result, with_found
+    from cli.read.root_search import pair, with_found
     from cli.spin import tables
     from cli.spin.rotation import Rotation, read_body
+    from dalembert.results.result import Result
 
     if options.time is not None and options.at:
         raise bad("--at", "expected --time or --at, not both")
@@ -56,7 +56,7 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         times = [number_or_quantity("--at", text, "time") for text in options.at or ["0"]]
     chosen = only(options.only, tables.QUANTITIES)
     if options.page is not None:
-        from cli.show.picture import refuse_long
+        from cli.read.options import refuse_long
 
         refuse_long(len(times))
     turning = read_body(options.body)
@@ -70,10 +70,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     rotation.states  # noqa: B018  faults of the data are errors before anything is shown
 
     def moving() -> bytes:
-        from cli.show.picture import shown
+        from dalembert.results.chosen_units import shown
         from rigidbody3d.animation import turning_page
 
-        table = shown(tables.states(rotation), show.units)
+        table = shown(tables.states(rotation), show.chosen_units)
         made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
         return made.html.encode()
 

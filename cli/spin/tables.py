@@ -13,8 +13,8 @@ import numpy as np
 
 from cli.read import root_search
 from cli.read.options import bad
-from cli.show.picture import blank
 from cli.spin.rotation import Rotation, TurningBody
+from dalembert.drawing.sheet import blank
 from dalembert.results.columns import Column, Table, listed, names, number, vector
 from dalembert.results.way import Topic, figures
 from rigidbody3d import check

@@ -11,7 +11,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 METHOD = (
@@ -39,9 +39,9 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     need as many fields of virtual velocities, named in a column field.
     """
     g = 0j if options.gravity is None else plane_vector("--gravity", options.gravity, "acceleration")
-    from cli.show.result import Result
     from cli.work.power import WorkBalance, draw, tables, way
     from cli.work.states import read_states
+    from dalembert.results.result import Result
 
     table = read_states(options.states)
     balance = WorkBalance(table, g)

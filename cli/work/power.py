@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from cli.cases.ledger import Entry, why_not
 from cli.cases.ledger import ledger as ledger_topic
-from cli.show.picture import blank
 from cli.work.states import COLUMNS, LOADS, Cell, Real, StateTable, Unknown
+from dalembert.drawing.sheet import blank
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, finite, names, number
 from dalembert.results.way import Topic, figures

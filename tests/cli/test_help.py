@@ -267,7 +267,7 @@ def parsed(words: list[str]) -> dict[str, object]:
 
     from cli.show.commands import with_options
     from cli.show.help import with_help
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     taken: list[dict[str, object]] = []
 

@@ -12,8 +12,8 @@ import pytest
 
 from cli.show.commands import ShowOptions
 from cli.show.output import show
-from cli.show.result import Result
 from dalembert.results.columns import Column, Table
+from dalembert.results.result import Result
 from tests.conftest import Dalembert
 
 MASSES = "name,mass_g,radius_mm,angle_deg,z_mm\na,13.5,20,{0},10\nb,7.1,15,{1},30\n"

@@ -7,85 +7,22 @@ from contextlib import AbstractContextManager, nullcontext
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, NamedTuple
 
-from cli.read.options import bad
-from dalembert.dataclass import dataclass, field, replace
-from dalembert.decimals import Scaled
-from dalembert.hints import nearest
+from dalembert.dataclass import dataclass, field
+from dalembert.results.chosen_units import in_units
 from dalembert.results.columns import Table, document
-from dalembert.units import UNITS, dimensions, find_unit, from_si, to_si, unit_name
 
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import TypeAlias
 
-    import numpy as np
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
-    from cli.read.root_search import Found
-    from dalembert.results.columns import Column, Document, Json, Values
+    from dalembert.results.bars import Bars
+    from dalembert.results.columns import Document, Json
     from dalembert.results.way import Topic
 
     Part: TypeAlias = "Table | list[Document]"
     Form = Callable[[Part, int], "Written"]
-
-
-BLOCKS = 24
-BARS_STYLE = """
-.bars { display: grid; grid-template-columns: fit-content(42%) 1fr max-content; gap: .8mm 2mm; align-items: center; margin: 2mm 0; font-size: 9pt }
-.bars span:nth-child(3n) { font-variant-numeric: tabular-nums; text-align: right } .track { position: relative; display: block; height: 3.4mm; background: #f2f2f2 }
-.track i, .track u { position: absolute; top: 0; bottom: 0; print-color-adjust: exact; -webkit-print-color-adjust: exact } .track i { left: 0; background: #8a8a8a }
-.track i.after { background: #06632f } .track i.over { background: #b00020 } .track u { width: .4mm; background: #b00020; top: -.6mm; bottom: -.6mm }
-"""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Bar:
-    """A bar: its label, how long it is, and the number beside it."""
-
-    label: str
-    value: float
-    text: str
-    after: bool
-    """Whether it shows what was made of the first one."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Bars:
-    """Bars of one scale, with the limit that they are held against."""
-
-    rows: Sequence[Bar]
-    limit: float | None = None
-    limit_text: str = ""
-
-    @property
-    def _whole(self) -> float:
-        return max([row.value for row in self.rows] + [1.1 * (self.limit or 0.0)]) or 1.0
-
-    def html(self) -> str:
-        """Return them as HTML."""
-        import html
-
-        cells = []
-        for row in self.rows:
-            over = self.limit is not None and row.value > self.limit * (1 + 1e-9)
-            kind = f' class="{"over" if over else "after"}"' if row.after else ""
-            line = "" if self.limit is None else f'<u style="left:{100 * self.limit / self._whole:.2f}%"></u>'
-            cells.append(
-                f'<span>{html.escape(row.label)}</span><span class="track"><i{kind} style="width:{100 * row.value / self._whole:.2f}%">'
-                f"</i>{line}</span><span>{html.escape(row.text)}</span>"
-            )
-        note = f"<p>{html.escape(self.limit_text)}</p>\n" if self.limit_text else ""
-        return f'<div class="bars">{"".join(cells)}</div>\n{note}'
-
-    def text(self) -> str:
-        """Return them as lines of blocks, in a fixed width."""
-        wide = max(len(row.label) for row in self.rows)
-        lines = [
-            f"{row.label:<{wide}}  {'█' * round(BLOCKS * row.value / self._whole) or '▏'} {row.text}"
-            for row in self.rows
-        ]
-        return "\n".join([*lines, *([self.limit_text] if self.limit_text else [])])
 
 
 class Written(NamedTuple):
@@ -182,108 +119,13 @@ class Result:
         return whole
 
 
-def with_found(result: Result, solution: Found) -> Result:
-    """Return the result with the number of --find: above the table, in JSON, in addition to a table alone."""
-    notes, document, aside = result.notes, result.documented, result.aside
-    return replace(
-        result,
-        notes=lambda: "\n".join(filter(None, (notes(), f"found: {solution.text}"))),
-        document=lambda: {**document(), "found": {solution.header: solution.value}},
-        aside=lambda: [*aside(), f"found: {solution.text}"],
-    )
-
-
-# amplitudes keep the unit they were measured in, and what is per such a unit with them
-_DIMENSIONS = [dimension for dimension in UNITS if dimension not in ("number", "amplitude", "per")]
-_MEASURED = ("amplitude", "magnitude")
-
-
-def chosen_units(text: str) -> dict[str, str]:
-    """Read `mm,g,deg,N_mm,rpm`: dimension -> unit.
-
-    Raises
-    ------
-    typer.BadParameter
-        An unknown unit, or two of one dimension.
-    """
-    chosen: dict[str, str] = {}
-    for part in text.split(","):
-        word = unit_name(part)
-        fitting = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
-        if not any(unit in UNITS[d] for d, unit in fitting.items()) and dimensions(word):
-            # a unit of vibration, such as mil
-            fitting = {}
-        if not word or not fitting:
-            units = sorted({unit for d in _DIMENSIONS for unit in UNITS[d]})
-            hint = (
-                f"; '{word}' is a unit of amplitude, and amplitudes keep the file's"
-                if dimensions(word)
-                else nearest(word, units)
-            )
-            raise bad(
-                "--units",
-                f"'{part.strip()}' is no unit of a column: expected units such as mm,g,deg,N_mm,rpm{hint}",
-            )
-        for dimension, unit in fitting.items():
-            if chosen.setdefault(dimension, unit) != unit:
-                both = f"{chosen[dimension]} and {unit}"
-                raise bad("--units", f"{both} are both units of {dimension}: expected one of them")
-    return chosen
-
-
-def in_units(table: Table, chosen: Mapping[str, str]) -> Table:
-    """Return the table with its columns in the units chosen, as far as they fit."""
-    columns = [_in_unit(column, chosen) for column in table.columns]
-    renamed = {old.header: new.header for old, new in zip(table.columns, columns, strict=True)}
-    return replace(table, columns=columns, keys=[renamed.get(key, key) for key in table.keys])
-
-
-def finished(table: Table, units: str | None, digits: bool) -> tuple[Table, int]:
-    """Return the table in the chosen units, with --digits cut to its right digits, and the number of those without a right digit."""
-    if units is not None:
-        table = in_units(table, chosen_units(units))
-    if not digits:
-        return table, 0
-    # loaded where --digits needs it
-    from dalembert.results.digits import digits_that_hold
-
-    return digits_that_hold(table)
-
-
-def _in_unit(column: Column, chosen: Mapping[str, str]) -> Column:
-    fits = [d for d in _DIMENSIONS if d in chosen and find_unit(d, column.unit) == column.unit]
-    if not fits or chosen[fits[0]] == column.unit or column.name.startswith(_MEASURED):
-        return column
-    dimension = fits[0]
-    old, new, error = column.unit, chosen[dimension], column.error
-
-    def convert(value: Scaled) -> Scaled:
-        return from_si(to_si(value, dimension, old), dimension, new)
-
-    def cells(values: Values) -> Values:
-        if not isinstance(values, Sequence):
-            return convert(values)
-        return [
-            value if value is None or isinstance(value, str) else convert(float(value)) for value in values
-        ]
-
-    def errors() -> Sequence[float] | NDArray[np.float64]:
-        import numpy as np
-
-        assert error is not None
-        return convert(np.asarray(error(), dtype=float))
-
-    return replace(column, unit=new, values=cells(column.values), error=None if error is None else errors)
-
-
 WAY_ROWS = 72
 """Rows of a table of the worked solution that a terminal shows."""
 
 
-def way_text(result: Result, units: str | None, terminal: bool) -> str:
+def way_text(result: Result, units: Mapping[str, str] | None, terminal: bool) -> str:
     """Return the topics as text, one below the other."""
     assert result.way is not None
-    chosen = None if units is None else chosen_units(units)
     width = get_terminal_size().columns if terminal else None
     lines = [""]
     for topic in result.way():
@@ -292,7 +134,7 @@ def way_text(result: Result, units: str | None, terminal: bool) -> str:
             if isinstance(part, str):
                 lines.append(part.rstrip("\n"))
             elif part.columns and part.length:
-                table = part if chosen is None else in_units(part, chosen)
+                table = part if units is None else in_units(part, units)
                 lines.append(table_block(table, width, WAY_ROWS).rstrip("\n"))
         lines.append("")
     return "\n".join(lines)

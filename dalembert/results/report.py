@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import html
 import re
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from cli.read.options import HEAD
-from cli.show.files import markdown
-from cli.show.picture import drawn
-from cli.show.result import BARS_STYLE, Bars, Section, Sheet, finished, way_sheets, with_sentences
+from dalembert.drawing.sheet import drawn
 from dalembert.errors import DataError
 from dalembert.quantities import is_number, parse_quantity
+from dalembert.results.bars import BARS_STYLE, Bars
+from dalembert.results.chosen_units import finished
 from dalembert.results.columns import Column, Table
+from dalembert.results.files import markdown
+from dalembert.results.result import Section, Sheet, way_sheets, with_sentences
 from dalembert.results.text import BAD, GOOD, Grid, has_names, heading, in_blocks, printed, without_noise
 from dalembert.tables.files import load, name_of, named
 from dalembert.tables.sources import open_source
@@ -26,10 +27,9 @@ from dalembert.units import LISTED, parted, written
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.commands import ShowOptions
-    from cli.show.expect import Comparison
-    from cli.show.result import Result
     from dalembert.results.columns import Cell
+    from dalembert.results.expect import Comparison
+    from dalembert.results.result import Result
 
 
 ROWS = 36  # rows of a result that are shown
@@ -67,24 +67,39 @@ class Report:
 
 
 def report(
-    result: Result, options: ShowOptions, call_options: Mapping[str, str], checked: Comparison | None
+    result: Result,
+    about: Mapping[str, str] = MappingProxyType({}),
+    *,
+    units: Mapping[str, str] | None = None,
+    digits: bool = False,
+    options: Mapping[str, str] = MappingProxyType({}),
+    words: Sequence[str] = (),
+    checked: Comparison | None = None,
 ) -> Report:
     """Put a report together.
 
-    `call_options` are the command's own options in the call, and their values; `checked` is how the result compares with
-    what was expected. What the options say for its head goes before what the file itself says.
+    Parameters
+    ----------
+    about
+        The head: its title, and the lines below it.
+    units, digits
+        The units of columns that were chosen, and whether only digits that hold are shown.
+    options
+        The command's own options in the call, and their values.
+    words
+        The call itself, behind the name of the program.
+    checked
+        How the result compares with what was expected.
     """
-    from datetime import date
     from importlib.metadata import version
 
     def finish(table: Table) -> Table:
-        return finished(table, options.units, options.digits)[0]
+        return finished(table, units, digits)[0]
 
-    about = {"date": date.today().isoformat(), **result.about, **options.head}
     sheets = list(result.sheets() if result.sheets is not None else [_plain_sheet(result)])
     if result.shows_way:
         sheets += way_sheets(result)
-    inputs = list(_inputs(call_options, () if result.shows_input else named()))
+    inputs = list(_inputs(options, () if result.shows_input else named()))
     if sheets:
         sections = list(sheets[0].sections)
         if inputs and sections[0].title != VERDICT:
@@ -105,10 +120,10 @@ def report(
         )
         for sheet in sheets
     ]
-    call = " ".join(["dalembert", *map(_quoted, sys.argv[1:])])
+    call = " ".join(["dalembert", *map(_quoted, words)])
     closing = [*([result.method] if result.method else []), f"dalembert {version('dalembert')}: {call}"]
-    shown = [(key, about[key]) for key in HEAD[1:] if about.get(key)]
-    return Report(about.get("title") or "Report", shown, pages, closing, result.warnings)
+    shown = [(key, value) for key, value in about.items() if key != "title"]
+    return Report(about.get("title", "Report"), shown, pages, closing, result.warnings)
 
 
 def _quoted(word: str) -> str:
@@ -139,11 +154,11 @@ def _plain_sheet(result: Result) -> Sheet:
     return Sheet("", sections, result.figure)
 
 
-def _inputs(call_options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
+def _inputs(options: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
     """Yield the options of the call, and what the files hold."""
-    if call_options:
+    if options:
         yield "; ".join(
-            name if value == "yes" else f"{name} {_spaced(value)}" for name, value in call_options.items()
+            name if value == "yes" else f"{name} {_spaced(value)}" for name, value in options.items()
         )
     for path in files:
         shown = name_of(path)
@@ -312,13 +327,8 @@ LONG = 40
 _NO_PICTURE = "(No picture: matplotlib is not installed.)"
 
 
-def pages(
-    result: Result, options: ShowOptions, call_options: Mapping[str, str], checked: Comparison | None = None
-) -> dict[Path, bytes]:
-    """Return the files of a result's report: the page itself, and with Markdown its pictures."""
-    path = options.report
-    assert path is not None
-    made = report(result, options, call_options, checked)
+def pages(path: Path, made: Report) -> dict[Path, bytes]:
+    """Return the files of a report: the page itself, and with Markdown its pictures."""
     if path.suffix.lower() == ".md":
         return _markdown(path, made)
     return {path: "".join(_html(made)).encode()}
