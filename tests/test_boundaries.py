@@ -101,23 +101,15 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
-        ("grade",),
         ("exercise",),
         ("completion",),
         (
             "balance",
             "body",
-            "engine",
             "examples",
             "field",
-            "flywheel",
-            "index",
             "mechanism",
-            "place",
-            "signal",
-            "spin",
-            "trial",
-            "work",
+            "rotor",
         ),
         ("formats",),
         ("cases",),
@@ -418,6 +410,17 @@ def test_a_check_of_inertias_loads_no_mechanism(tmp_path: Path) -> None:
     loaded = modules_after("body", str(robot), "--check-inertias")
     assert "rigidbody3d" in loaded
     assert "virtualwork" not in loaded
+
+
+def test_no_file_has_the_name_of_something_in_its_packages_own_file() -> None:
+    """Importing `cli.rotor.index` would put the file in the place of the function `index`."""
+    for module, tree in trees().items():
+        if module.endswith(".__init__") and module.startswith("cli."):
+            files = {name.split(".")[-1] for name in trees() if name.rpartition(".")[0] == module[:-9]}
+            named = {part for node in tree.body if isinstance(node, ast.ImportFrom) for part in node.names}
+            here = {part.asname or part.name for part in named}
+            here |= {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+            assert not files & here, module
 
 
 ROLES = (("command",), ("columns", "picture", "remarks", "report", "words"), ("solve",), ("read",))
