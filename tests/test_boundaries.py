@@ -119,7 +119,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("results",),
-        ("drawing", "page", "tables"),
+        ("drawing", "page", "tables", "written"),
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),

@@ -22,13 +22,13 @@ from cli.cases.poses import cells_of, keys_of, solved
 from cli.cases.poses import column as column_of
 from cli.read import root_search
 from cli.read.options import about, bad
-from cli.read.written import DEGREES, Written, written
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.tables.files import name_of, note, read_bytes, remember, split_sheet
 from dalembert.tables.table import read
 from dalembert.units import UNITS, from_si
 from dalembert.units import written as unit_text
+from dalembert.written import DEGREES, Written, written
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
