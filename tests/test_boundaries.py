@@ -123,7 +123,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),
-        ("dataclass", "decimals", "errors", "hints", "memory", "on_use"),
+        ("dataclass", "decimals", "errors", "hints", "memory", "on_use", "terminal"),
     ),
     "benchmarks": (
         ("__main__", "commands_page", "library_page", "page_pictures", "same_outputs", "trace_passes"),

@@ -16,12 +16,12 @@ from cli.cases.analysis import Analysis
 from cli.cases.case import AtOnce, Case, Study, like
 from cli.cases.cases import with_root
 from cli.cases.inputs import Inputs
-from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
 from dalembert.results.result import Result, Section, Sheet
 from dalembert.results.text import heading
+from dalembert.terminal import progress
 from virtualwork.formulas.forces import Effort, NewtonEuler
 from virtualwork.formulas.loops import Column, Margin, Size
 from virtualwork.formulas.numbers import condition
