@@ -40,6 +40,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "engine",
             "known_masses",
             "log_balance",
+            "mode_shapes",
             "placement",
             "prior",
             "tolerance",
