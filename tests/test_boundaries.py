@@ -41,6 +41,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "engine",
             "known_masses",
             "log_balance",
+            "mode_shapes",
             "placement",
             "prior",
             "tolerance",
@@ -121,11 +122,11 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("documents", "results"),
-        ("drawing", "page", "tables"),
+        ("drawing", "page", "tables", "written"),
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),
-        ("dataclass", "decimals", "errors", "hints", "memory", "on_use"),
+        ("dataclass", "decimals", "errors", "hints", "memory", "on_use", "terminal"),
     ),
     "benchmarks": (
         ("__main__", "commands_page", "library_page", "page_pictures", "same_outputs", "trace_passes"),

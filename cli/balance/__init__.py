@@ -81,9 +81,12 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         refuse("shows rigid balancing: it does not go with --modes", mass=options.mass)
     shapes = None
     if options.modes is not None:
-        from cli.balance.modes import read_modes
+        from balancing.mode_shapes import read_modes
 
-        shapes = read_modes(options.modes, options.mode_count, options.rigid)
+        try:
+            shapes = read_modes(options.modes, options.mode_count, options.rigid)
+        except ValueError as error:
+            raise bad("--mode-count", error) from None
     chosen = (
         from_table(options.planes)
         if options.planes is not None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from balancing import ModalCorrection
-    from cli.balance.modes import Modes
+    from balancing.mode_shapes import Modes
     from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]

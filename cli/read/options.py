@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from fractions import Fraction
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.written import Steps
 
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
@@ -298,40 +295,6 @@ def time_range(flag: str, text: str) -> list[float]:
     return grid(flag, text, lambda part: number_or_quantity(flag, part, "time"), "states", "0:10:0.01")
 
 
-class Steps(NamedTuple):
-    """A range in equal steps: (first + i·each)/below for i from 0 to n − 1, each the nearest double."""
-
-    first: int
-    each: int
-    below: int
-    n: int
-
-    def at(self, i: NDArray[np.intp]) -> NDArray[np.float64]:
-        """The values at some places."""
-        import numpy as np
-
-        if self._fits:
-            # one rounding, that of the division
-            return np.asarray((self.first + i * self.each) / self.below)
-        return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
-
-    def exact(self, i: NDArray[np.intp]) -> Doubled:
-        """The values at some places in 32 digits."""
-        from fractions import Fraction
-
-        from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_operations import doubled_array
-
-        if self._fits:
-            return Doubled((self.first + i * self.each).astype(float)) / float(self.below)
-        return doubled_array([Fraction(self.first + k * self.each, self.below) for k in i.tolist()], i.shape)
-
-    @property
-    def _fits(self) -> bool:
-        """Whether doubles hold the whole numbers exactly."""
-        return max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below) < 2**53
-
-
 def steps(
     flag: str, text: str, read: Callable[[list[str]], list[float] | list[Fraction]], example: str
 ) -> Steps:
@@ -340,6 +303,8 @@ def steps(
     `read` reads the two or three; of floats the decimals that they print as count.
     """
     from fractions import Fraction
+
+    from dalembert.written import Steps
 
     count = None
     body = text

@@ -18,8 +18,8 @@ import typer
 from cli import function_of
 from cli.read.options import HEAD
 from cli.show.commands import Declared, ShowOptions, with_options
-from cli.show.terminal import coloured
 from dalembert.errors import DataError, one_line
+from dalembert.terminal import coloured
 
 if TYPE_CHECKING:
     from dalembert.results.columns import Table
