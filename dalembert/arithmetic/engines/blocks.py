@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.arrays import EXPONENT, NUMPY
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.exact import UPPER, upper
-from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.sines import STEPS, table
 from dalembert.arithmetic.tape import Operation, Tape, performed, shortened
 
@@ -44,7 +43,6 @@ UFUNCS = {
     "atan2": "arctan2",
 }
 
-_FUNCTIONS: dict[str, Any] = {kind: getattr(np, name) for kind, name in UFUNCS.items()}
 # what the formulas of plain numbers consist of
 SIMPLE = {*UFUNCS, "const", "input", "select", "binade"}
 
@@ -262,12 +260,8 @@ def _once(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) ->
                 values.append(inputs[arguments[0]])
             else:
                 of = [values[a] for a in arguments]
-                if isinstance(of[0], float) and all(isinstance(x, float) for x in of):
-                    values.append(_on_floats(kind, of))
-                elif kind in UFUNCS:
-                    values.append(_FUNCTIONS[kind](*of))
-                else:
-                    values.append(performed(kind, of, NUMPY))
+                same = all(isinstance(x, float) for x in of)
+                values.append(_on_floats(kind, of) if same else performed(kind, of, NUMPY))
     for row, (_, number) in zip(out, tape.outputs, strict=True):
         row[:] = values[number]
 
@@ -275,6 +269,6 @@ def _once(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) ->
 def _on_floats(kind: str, of: list[float]) -> float:
     """An operation on floats; where Python raises, with numpy's infinity or NaN."""
     try:
-        return float(performed(kind, of, RECORDED))
+        return float(performed(kind, of, floats.FLOATS))
     except (ZeroDivisionError, ValueError, OverflowError):
         return float(performed(kind, [np.float64(x) for x in of], NUMPY))
