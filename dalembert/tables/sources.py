@@ -121,6 +121,17 @@ class Source:
         width, below = len(self.headings), islice(self.everything(), self.above + 1 + self.units_below, None)
         return (row for row in below if not _is_comment(row[1], width))
 
+    def full_rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield (line, cells) of every row of data, as many cells as the header has; a row with fewer or more is refused."""
+        width = len(self.headings)
+        for k, (line, cells) in enumerate(self.rows(), 1):
+            if len(cells) < width or any(cell.strip() for cell in cells[width:]):
+                many = "s" * (len(cells) != 1)
+                raise DataError(
+                    f"{self.file}: row {k} (line {line}): found {len(cells)} cell{many}, expected {width}"
+                )
+            yield line, cells[:width]
+
     def laid_out(self, headings: Sequence[Heading], rows: Iterable[tuple[int, list[str]]]) -> Source:
         """Return the table with other columns, and the rows of data that it then has."""
         records = [(0, [each.written for each in headings]), *rows]
