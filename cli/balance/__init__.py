@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -124,10 +125,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     with processes(options.workers) as executor:
         balancing = Balancing(rotors, chosen, request, executor)
 
-    def figure() -> Figure:
+    def figure(*, polygons: bool = False) -> Figure:
         from cli.balance.page import draw
 
-        return draw(balancing, polygons=show.steps)
+        return draw(balancing, polygons=polygons)
 
     def way() -> list[Topic]:
         from cli.balance.way import way
@@ -145,6 +146,8 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         beside={} if options.page is None else {options.page: sheet},
         head={"correction": "remove" if options.remove else "add"},
         figure=figure,
+        # the worked solution of a report has the polygons itself
+        plotted=partial(figure, polygons=show.steps),
         way=way,
         method=METHOD if shapes is None else MODAL,
         about={"title": "Balancing of known masses"},

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.read.options import bad, needed, quantity, refuse, two_bearings
-from dalembert.dataclass import dataclass
+from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_quantity
 from dalembert.results.columns import Table, names, number
@@ -277,12 +277,14 @@ def verdict_table(rows: Sequence[tuple[str, Verdict]], unit: str) -> Table:
             for size, limit in zip(sizes.tolist(), share.tolist(), strict=True)
         ]
 
+    # rounding of nothing is shown as nothing
+    residual = number("residual", "unbalance", np.where(after <= 1e-12 * before, 0.0, after), unit)
     columns = [
         names("rotor", [name for name, _ in rows]),
         names("plane", [v.plane for _, v in rows]),
         number("permissible", "unbalance", share, unit),
         number("initial", "unbalance", before, unit),
-        number("residual", "unbalance", after, unit),
+        replace(residual, stored=after),
         names("verdict", [v.of(v.residual) for _, v in rows], place=None),
     ]
     documented = [names("within", within(before)), names("residual_within", within(after))]

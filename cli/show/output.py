@@ -118,7 +118,8 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     if options.plot is not None and result.figure is not None:
         from dalembert.drawing.sheet import drawn
 
-        files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])
+        figure = result.plotted or result.figure
+        files[options.plot] = partial(drawn, figure, options.plot.suffix.lower()[1:])
     if output is not None:
         files[output] = partial(_formed, result, options.form)
     write_all(files)

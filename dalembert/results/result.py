@@ -77,6 +77,8 @@ class Result:
     aside: Callable[[], Sequence[str]] = lambda: ()
     """Requested results that stand in no table: lines for standard error, where the table alone is shown."""
     figure: Callable[[], Figure] | None = None
+    plotted: Callable[[], Figure] | None = None
+    """The picture of --plot, where it shows more than that of the report."""
     method: str = ""
     """The method and its source, for the report."""
     sheets: Callable[[], Iterable[Sheet]] | None = None

@@ -119,3 +119,18 @@ def test_a_pipe_has_the_verdict_of_a_grade_beside_the_corrections(
     # the terminal's table and the document have it themselves
     assert "verdict" not in dalembert(*words, *grade, "--json").stderr
     assert "note:" not in dalembert(*words, *grade, "--text").stderr
+
+
+@pytest.mark.parametrize("bearings", [(), ("--bearings", "-100mm:500mm")])
+def test_what_rounding_leaves_of_a_residual_is_shown_as_nothing(
+    bearings: tuple[str, ...], dalembert: Dalembert
+) -> None:
+    options = (*PLANES, "--grade", "API", "--speed", "2960rpm", "--rotor-mass", "85kg", "--center-z", "150mm")
+    text = dalembert("balance", "-", *options, *bearings, "--text", stdin=ROTOR).stdout
+    rows = [line.split() for line in text.splitlines() if line.endswith(" within")]
+    assert [row[-2] for row in rows] == ["0", "0"]
+    rough = dalembert(
+        "balance", "-", *options, *bearings, "--round-mass", "0.1g", "--text", stdin=ROTOR
+    ).stdout
+    rows = [line.split() for line in rough.splitlines() if line.endswith(" within")]
+    assert all(float(row[-2]) > 0.01 for row in rows)
