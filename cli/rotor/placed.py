@@ -67,9 +67,7 @@ def _vector(
     size = None if exact is None else lambda: exact().size
     turn = None if exact is None else lambda: exact().turned(vectors)
     return [
-        number(
-            mass, "mass", [abs(vector) for vector in vectors], unit, place=at[0], exact=size, shortened=True
-        ),
+        number(mass, "mass", [abs(vector) for vector in vectors], unit, place=at[0], exact=size),
         number(angle, "angle", [degrees(vector) for vector in vectors], error=turn, place=at[1]),
     ]
 
@@ -88,9 +86,7 @@ def masses(placings: Sequence[Placing]) -> Table:
         *named,
         names("position", [str(m.place + 1) for _, m in every]),
         number("angle", "angle", [m.angle for _, m in every], exact=exact(lambda m: m.angle)),
-        number(
-            "mass", "mass", [m.mass for _, m in every], unit, exact=exact(lambda m: m.mass), shortened=True
-        ),
+        number("mass", "mass", [m.mass for _, m in every], unit, exact=exact(lambda m: m.mass)),
     ]
     if request.planes is not None:
         z = number("z", "length", [m.share.z or 0.0 for _, m in every], "mm")

@@ -14,7 +14,7 @@ from balancing import index_balancing
 from balancing.indexing import Indexed
 from balancing.runs.vectors import parted_cells
 from dalembert.angles import degrees, phasor
-from dalembert.decimals import Scaled, short
+from dalembert.decimals import Scaled
 from dalembert.errors import DataError, quote
 from dalembert.results.columns import Column, Table, apart, listed, names, number
 from dalembert.results.way import Topic, figures, vector_text
@@ -147,8 +147,7 @@ def size(
     """A column of sizes in the unit of the file; JSON has unbalances in kg·m, amplitudes in the unit of the file."""
     result = np.asarray(values, dtype=float)
     if p.quantity == "unbalance":
-        return number(name, "unbalance", result, p.unit, place=place, exact=exact, shortened=True)
-    result = short(result)
+        return number(name, "unbalance", result, p.unit, place=place, exact=exact)
     return Column(name, p.unit, result, None if exact is None else apart(result, "number", "", exact), place)
 
 

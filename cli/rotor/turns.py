@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import ceil, floor, pi
 from typing import TYPE_CHECKING, Any
 
@@ -146,20 +146,19 @@ def tables(wheel: Flywheel) -> dict[str, Callable[[], Table]]:
 def results(wheel: Flywheel) -> Table:
     """One row."""
     unit, peak = wheel.torque_unit, int(np.argmax(np.abs(wheel.torque)))
-    cell = partial(computed, wheel, shortened=True)
     columns = [
-        cell("mean_torque", "torque", lambda w: w.cycle.mean, unit),
-        cell("work", "energy", lambda w: w.cycle.work),
-        cell("energy_fluctuation", "energy", lambda w: w.cycle.fluctuation),
-        cell("flywheel_inertia", "inertia", lambda w: w.inertia),
-        cell("peak_torque", "torque", lambda w: w.torque[peak], unit),
-        cell("peak_torque_angle", "angle", lambda w: w.angle[peak]),
-        cell("mean_power", "power", lambda w: w.cycle.mean * w.speed),
+        computed(wheel, "mean_torque", "torque", lambda w: w.cycle.mean, unit),
+        computed(wheel, "work", "energy", lambda w: w.cycle.work),
+        computed(wheel, "energy_fluctuation", "energy", lambda w: w.cycle.fluctuation),
+        computed(wheel, "flywheel_inertia", "inertia", lambda w: w.inertia),
+        computed(wheel, "peak_torque", "torque", lambda w: w.torque[peak], unit),
+        computed(wheel, "peak_torque_angle", "angle", lambda w: w.angle[peak]),
+        computed(wheel, "mean_power", "power", lambda w: w.cycle.mean * w.speed),
     ]
     if not wheel.constant:
         columns += [
-            cell("fastest_angle", "angle", lambda w: w.cycle.fastest * 180.0 / np.pi),
-            cell("slowest_angle", "angle", lambda w: w.cycle.slowest * 180.0 / np.pi),
+            computed(wheel, "fastest_angle", "angle", lambda w: w.cycle.fastest * 180.0 / np.pi),
+            computed(wheel, "slowest_angle", "angle", lambda w: w.cycle.slowest * 180.0 / np.pi),
         ]
     turns = "one turn" if wheel.turns == 1 else f"{wheel.turns} turns"
     return Table(columns, place="", above=f"over {turns} of the shaft, against a constant load:", documented=[names("turns", [wheel.turns])])  # fmt: skip
@@ -175,7 +174,7 @@ def energy(wheel: Flywheel) -> Table:
     columns = [
         computed(wheel, "angle", "angle", lambda w: w.angle),
         computed(wheel, "torque", "torque", lambda w: w.torque, wheel.torque_unit),
-        computed(wheel, "energy", "energy", stored, shortened=True),
+        computed(wheel, "energy", "energy", stored),
     ]
     return Table(columns, ("angle_deg",), "cycle[]", "of the flywheel, from zero in the first row")
 
