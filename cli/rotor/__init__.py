@@ -1,6 +1,6 @@
 """The commands on rotors that are small: which options each takes, and what it shows.
 
-Each has its tables beside it: `trial` (`trial_mass.py`), `signal` (`recording.py`), `place` (`placing.py`, `placed.py`),
+Each has its tables beside it: `trial` and `signal` (`before_field.py`), `place` (`placing.py`, `placed.py`),
 `index` (`positions.py`), `engine` (`cylinders.py`, `orders.py`), `flywheel` (`turns.py`). `balance` and `field` have
 folders of their own.
 """
@@ -40,7 +40,7 @@ def trial(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     Its centrifugal force is a tenth of the static load of each plane.
     """
-    from cli.rotor.trial_mass import RULE, suggestion, way
+    from cli.rotor.before_field import RULE, suggestion, way_of_trial
     from dalembert.results.result import Result
 
     mass = needed("--rotor-mass", options.rotor_mass, "mass", positive=True)
@@ -48,7 +48,7 @@ def trial(options: SimpleNamespace, _: ShowOptions) -> Result:
     radius = needed("--radius", options.radius, "length", positive=True)
 
     return Result(
-        way=partial(way, mass, speed, radius, options.planes),
+        way=partial(way_of_trial, mass, speed, radius, options.planes),
         tables={"trial": partial(suggestion, mass, speed, radius, options)},
         method=f"Rule: {RULE}.",
         about={"title": "Trial mass"},
@@ -70,13 +70,17 @@ def signal(options: SimpleNamespace, _: ShowOptions) -> Result:
     FILE has the columns t_*, mark (once per turn; tacho, keyphasor, pulse and trigger are other names) and a column of
     vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
     """
-    from cli.rotor.recording import read_recording, vectors, way
+    from balancing.runs.recording import read_recording
+    from cli.rotor.before_field import vectors, way_of_recording
     from dalembert.results.result import Result
 
-    read = read_recording(options.recording, options.pulses)
+    try:
+        read = read_recording(options.recording, options.pulses)
+    except ValueError as error:
+        raise bad("--pulses", error) from None
 
     return Result(
-        way=partial(way, read),
+        way=partial(way_of_recording, read),
         tables={"signal": lambda: vectors(read)},
         head={"amplitude_unit": read.unit},
         about={"title": "Vibration once per turn"},
