@@ -33,7 +33,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("runs",),
-        ("log_picture",),
+        ("log_picture", "placing"),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (
             "amplitudes",

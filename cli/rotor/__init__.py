@@ -1,6 +1,6 @@
 """The commands on rotors that are small: which options each takes, and what it shows.
 
-Each has its tables beside it: `trial` and `signal` (`before_field.py`), `place` (`placing.py`, `placed.py`),
+Each has its tables beside it: `trial` and `signal` (`before_field.py`), `place` (`placed.py`),
 `index` (`positions.py`), `engine` (`cylinders.py`, `orders.py`), `flywheel` (`turns.py`). `balance` and `field` have
 folders of their own.
 """
@@ -19,7 +19,7 @@ from dalembert.quantities import parse_number
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from cli.rotor.placing import Drill
+    from balancing.placing import Drill
     from cli.show.commands import ShowOptions
     from dalembert.results.result import Result
     from dalembert.results.way import Topic
@@ -130,12 +130,12 @@ def place(options: SimpleNamespace, show: ShowOptions) -> Result:
     Several corrections are added as vectors first. Without --positions or --blades the result is one mass. In a FILE
     each plane of each rotor is placed on its own.
     """
-    from cli.rotor.placed import METHOD, draw, tables, way
-    from cli.rotor.placing import Placing, Request, read_corrections
+    from balancing.placing import Placing, Request
+    from cli.rotor.placed import METHOD, corrections_of, draw, tables, way
     from dalembert.results.result import Result, Section, Sheet
     from dalembert.results.text import heading
 
-    every = read_corrections(options.corrections, options.rotor, options.plane)
+    every = corrections_of(options.corrections, options.rotor, options.plane)
     stated = (
         []
         if options.remove or not every[0].removed
@@ -230,7 +230,7 @@ def _drill(drill: str | None, density: str | None, drill_point: str, max_depth: 
     """Read --drill and what goes with it."""
     from fractions import Fraction
 
-    from cli.rotor.placing import Drill
+    from balancing.placing import Drill
 
     diameter = quantity("--drill", drill, "length", positive=True)
     rho = quantity("--density", density, "density", positive=True)
