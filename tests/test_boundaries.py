@@ -33,7 +33,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("runs",),
-        ("log_picture", "placing"),
+        ("cylinders", "log_picture", "placing"),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (
             "amplitudes",
@@ -63,6 +63,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "indexing",
             "phase",
             "picture",
+            "planes",
             "rotor",
             "synchronous",
         ),

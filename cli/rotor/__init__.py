@@ -1,7 +1,7 @@
 """The commands on rotors that are small: which options each takes, and what it shows.
 
 Each has its tables beside it: `trial` and `signal` (`before_field.py`), `place` (`placed.py`),
-`index` (`positions.py`), `engine` (`cylinders.py`, `orders.py`), `flywheel` (`turns.py`). `balance` and `field` have
+`index` (`positions.py`), `engine` (`orders.py`), `flywheel` (`turns.py`). `balance` and `field` have
 folders of their own.
 """
 
@@ -317,9 +317,9 @@ def engine(options: SimpleNamespace, _: ShowOptions) -> Result:
     counter-clockwise from +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft
     balances a force; two of one order and sense balance force and couple.
     """
+    from balancing.cylinders import Engine, read_cylinders
     from cli.read.rotor_options import from_options
-    from cli.rotor.cylinders import Engine, read_cylinders, read_shafts
-    from cli.rotor.orders import METHOD, draw, tables, warnings, way
+    from cli.rotor.orders import METHOD, draw, read_shafts, tables, warnings, way
     from dalembert.results.result import Result
 
     if options.speed is None:
