@@ -34,7 +34,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("runs",),
-        ("log_picture",),
+        ("cylinders", "log_picture", "placing"),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (
             "amplitudes",
@@ -64,6 +64,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "indexing",
             "phase",
             "picture",
+            "planes",
             "rotor",
             "synchronous",
         ),
@@ -92,6 +93,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
+        ("rotation_in_time",),
+        ("turning_body",),
         ("parts", "robots"),
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),

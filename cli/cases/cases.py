@@ -21,9 +21,10 @@ from cli.cases.inputs import Axis, Driven, Grid, Varied, of_one, with_numbers
 from cli.cases.poses import cells_of, keys_of, solved
 from cli.cases.poses import column as column_of
 from cli.read import root_search
-from cli.read.options import about, bad
+from cli.read.options import bad
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
+from dalembert.results.about import about
 from dalembert.tables.files import name_of, note, read_bytes, remember, split_sheet
 from dalembert.tables.table import read
 from dalembert.units import UNITS, from_si

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cli import function_of
-from cli.read.options import HEAD
 from cli.show.commands import Declared, ShowOptions, with_options
 from dalembert.errors import DataError, one_line
+from dalembert.results.about import HEAD
 from dalembert.terminal import coloured
 
 if TYPE_CHECKING:
