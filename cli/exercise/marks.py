@@ -11,11 +11,11 @@ from functools import cached_property
 from pathlib import Path
 
 from cli.exercise.description import MARKED, Answer, Ask, Exercise, Value, same, value_of
+from cli.exercise.follows import Follows
 from cli.exercise.recomputed import Recomputed, candidates
 from cli.exercise.slips import Candidates
 from cli.exercise.solving import Workshop
 from cli.exercise.variants import Variant
-from cli.grade.follows import Follows
 from dalembert.errors import DataError, quote
 from dalembert.figures import Right, Typed, typed
 from dalembert.quantities import is_number, unit_ratio

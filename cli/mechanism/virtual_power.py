@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cli.cases.ledger import Entry, why_not
 from cli.cases.ledger import ledger as ledger_topic
-from cli.work.states import COLUMNS, LOADS, Cell, Real, StateTable, Unknown
+from cli.mechanism.link_states import COLUMNS, LOADS, Cell, Real, StateTable, Unknown
 from dalembert.drawing.sheet import blank
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table, finite, names, number
@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dalembert.arithmetic.doubled import Doubled
+
+METHOD = (
+    "Virtual power: the applied forces and the inertia forces −m·a, −I·α together do no work on the given velocities "
+    "(d'Alembert and Lagrange; J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 1–5)."
+)
 
 
 def _vector(x: Any, y: Any) -> Any:

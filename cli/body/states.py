@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cli.body.rotation import Rotation, TurningBody
 from cli.read import root_search
 from cli.read.options import bad
-from cli.spin.rotation import Rotation, TurningBody
 from dalembert.drawing.sheet import blank
 from dalembert.results.columns import Column, Table, listed, names, number, vector
 from dalembert.results.way import Topic, figures
@@ -24,7 +24,7 @@ from rigidbody3d.picture.rotation import rotation as draw_rotation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.spin.rotation import Array
+    from cli.body.rotation import Array
 
 
 METHOD = (

@@ -1,15 +1,13 @@
-"""`dalembert signal`: amplitude and phase of a recorded vibration, a row for each sensor."""
+"""A recorded vibration once per turn: its columns, amplitude and phase of each sensor, the worked solution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from cli.read.options import bad
-from cli.show.output import command
 from dalembert.angles import degrees
 from dalembert.errors import DataError
 from dalembert.units import AMPLITUDES, UNITS, amplitude_kind, find_unit
@@ -19,44 +17,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from balancing.synchronous import OncePerTurn
-    from cli.show.commands import ShowOptions
     from dalembert.arithmetic.doubled import Doubled
     from dalembert.results.columns import Table
-    from dalembert.results.result import Result
     from dalembert.results.way import Topic
     from dalembert.tables.table import Table as ReadTable
 
-OPTIONS = """
-Arguments:
-  recording FILE  CSV of a recording: t_s, mark (or tacho), A_um …; - is standard input.
-What:
-  pulses N(1-10000)=1  Number of pulses of the mark in one turn.
-"""
 FINE = 1e-4
 """Phases that hold to this, rad, come without a warning."""
 STEADY = 0.02
 """Turns whose speeds have a larger standard deviation, relatively, come with a warning."""
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
-
-
-@command(OPTIONS, without=("plot",))
-def run(options: SimpleNamespace, _: ShowOptions) -> Result:
-    """Compute amplitude and phase of a recorded vibration, once per turn.
-
-    FILE has the columns t_*, mark (once per turn; tacho, keyphasor, pulse and trigger are other names) and a column of
-    vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
-    """
-    from dalembert.results.result import Result
-
-    read = read_recording(options.recording, options.pulses)
-
-    return Result(
-        way=partial(way, read),
-        tables={"signal": lambda: vectors(read)},
-        head={"amplitude_unit": read.unit},
-        about={"title": "Vibration once per turn"},
-        warnings=read.warnings,
-    )
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.engine import Forces, piston_orders
-from cli.engine.cylinders import Engine
+from cli.rotor.cylinders import Engine
 from dalembert.angles import degrees
 from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.amounts import prefixed
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.engine.cylinders import Complex, Real
+    from cli.rotor.cylinders import Complex, Real
 
 
 METHOD = (

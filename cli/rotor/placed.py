@@ -11,7 +11,7 @@ import numpy as np
 from balancing import drill_depth
 from balancing.picture import Places, places
 from balancing.weights import angles_again
-from cli.place.placing import Drill, Placed, Placing, Share
+from cli.rotor.placing import Drill, Placed, Placing, Share
 from dalembert.angles import degrees, phasor
 from dalembert.drawing.sheet import blank
 from dalembert.results.columns import Column, Table, names, number
