@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.rotation import period_of, taylor
-from cli.spin.rotation import Rotation, read_body
-from cli.spin.tables import constants
+from cli.body.rotation import Rotation, read_body
+from cli.body.states import constants
 from dalembert.tables.exact import LONG, as_written
 from dalembert.tables.table import Numbers
 

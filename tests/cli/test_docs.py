@@ -10,8 +10,8 @@ import typer
 
 from cli import COMMANDS
 from cli.app import build
+from cli.body.rotation import KEYS
 from cli.read.options import HEAD
-from cli.spin.rotation import KEYS
 from dalembert.units import UNITS
 from virtualwork.describe.description import FILE
 from virtualwork.describe.description import UNITS as OF_FILE

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from cli.body.rotation import read_body
 from cli.read.options import HEAD, about
-from cli.spin.rotation import read_body
 from dalembert.errors import DataError, toml_text
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
