@@ -232,7 +232,7 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
     for header in table.header:
         if "." in header and header not in used:
             try:
-                (*_, last) = named(m, header.strip(), every)
+                (*_, last) = named(m, header.strip())
             except DescriptionError as error:
                 raise DataError(f"{table.file}: column {header}: {error}") from None
             raise DataError(f"{table.file}: column {header}: expected one number, such as {last.header}")

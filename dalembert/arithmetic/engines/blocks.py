@@ -249,21 +249,29 @@ def _runs(tape: Tape) -> list[int]:
 
 
 def _once(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
-    """Do a tape's operations one by one: of lanes by numpy, of what is the same for all of them on floats."""
-    inputs = {name: x if x.ndim else float(x) for name, x in zip(tape.inputs, columns, strict=True)}
-    values: list[Any] = []
+    """Do a tape's operations one by one."""
     with np.errstate(all="ignore"):
-        for kind, *arguments in tape.operations:
-            if kind == "const":
-                values.append(arguments[0])
-            elif kind == "input":
-                values.append(inputs[arguments[0]])
-            else:
-                of = [values[a] for a in arguments]
-                same = all(isinstance(x, float) for x in of)
-                values.append(_on_floats(kind, of) if same else performed(kind, of, NUMPY))
+        values = one_by_one(tape, dict(zip(tape.inputs, columns, strict=True)))
     for row, (_, number) in zip(out, tape.outputs, strict=True):
         row[:] = values[number]
+
+
+def one_by_one(tape: Tape, inputs: Mapping[str, Reals], left: Sequence[bool] | None = None) -> list[Any]:
+    """The values of a tape's operations: of arrays by numpy, of numbers on floats; None where they are `left` for later."""
+    values: list[Any] = []
+    for number, (kind, *arguments) in enumerate(tape.operations):
+        if kind == "const":
+            values.append(arguments[0])
+        elif kind == "input":
+            x = inputs[arguments[0]]
+            values.append(x if x.ndim else float(x))
+        elif left is not None and left[number]:
+            values.append(None)
+        else:
+            of = [values[a] for a in arguments]
+            same = all(isinstance(x, float) for x in of)
+            values.append(_on_floats(kind, of) if same else performed(kind, of, NUMPY))
+    return values
 
 
 def _on_floats(kind: str, of: list[float]) -> float:
