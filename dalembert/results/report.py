@@ -235,8 +235,8 @@ def _grids(table: Table) -> Iterator[Part]:
     kept = range(0, length, every) if thinned else range(min(length, ROWS))
     headers: list[str] = []
     texts: list[list[str]] = []
-    for column in table.columns:
-        values = without_noise(_known(column, kept), column.unit)
+    certain = [replace(column, values=_known(column, kept)) for column in table.columns]
+    for column, values in zip(table.columns, without_noise(certain), strict=True):
         cells = [
             "yes" if v is True else "no" if v is False else t
             for v, t in zip(values, printed(column.header, values), strict=True)
