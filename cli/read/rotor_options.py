@@ -14,7 +14,7 @@ from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_quantity
 from dalembert.results.columns import Table, names, number
 from dalembert.tables.table import read
-from dalembert.units import SMALLEST, to_si
+from dalembert.units import SMALLEST, from_si, to_si, written
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,6 +187,10 @@ class Tolerance:
     """U_per of the whole rotor, kg·m; with MIL that of each plane."""
     bearings: tuple[float, float] | None = None
     """Where along the shaft it holds, m; None: in the correction planes."""
+
+    def text(self, unit: str) -> str:
+        """Return it in a unit, as people write it: `60 g·mm`."""
+        return f"{from_si(self.permissible, 'unbalance', unit):.6g} {written(unit)}"
 
     @property
     def iso(self) -> bool:
