@@ -24,6 +24,8 @@ FINE = 1e-4
 """Phases that hold to this, rad, come without a warning."""
 STEADY = 0.02
 """Turns whose speeds have a larger standard deviation, relatively, come with a warning."""
+DRIFT = 0.01
+"""Drifts that may change an amplitude by a larger share come with a warning."""
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
 
@@ -132,8 +134,35 @@ def read_recording(path: str, pulses: int = 1) -> Recording:
                 f"{table.file}: {share:.0%} of the samples of {sensor} have its largest or smallest value: the recording is "
                 "clipped, and the amplitude too small; record with a larger range"
             )
+        k, error = sensors.index(sensor), _drift(t.si, samples, result) / np.pi
+        # what scatters from turn to turn is in the uncertainty
+        if error > max(DRIFT * abs(result.vector[k]), 3 * result.deviation[k]):
+            table.warnings.append(
+                f"{table.file}: the level of {sensor} drifts: the amplitude may be off by {error:.2g} {unit} for it; record without the "
+                "offset (AC coupling, a high-pass filter)"
+            )
     exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
     return Recording(sensors, unit, result, table.warnings, exact)
+
+
+def _drift(t: NDArray[np.float64], samples: NDArray[np.float64], of: OncePerTurn) -> float:
+    """Return how far the level of a signal drifts in a turn, by the means of two equal numbers of turns; a ramp of this size adds
+    1/π of it to the first order.
+
+    >>> import numpy as np
+    >>> from balancing import once_per_turn
+    >>> t = np.arange(0, 1, 0.001)
+    >>> turns = once_per_turn(t, np.cos(40 * np.pi * t)[:, None], np.sin(40 * np.pi * t))
+    >>> round(_drift(t, np.cos(40 * np.pi * t) + 2 * t, turns), 3)
+    0.1
+    """
+    import numpy as np
+
+    half = of.turns // 2
+    if not half:
+        return 0.0
+    begin, middle, end = np.searchsorted(t, t[0] + 2 * np.pi / of.speed * half * np.arange(3))
+    return abs(float(samples[middle:end].mean() - samples[begin:middle].mean())) / half
 
 
 def _clipped(samples: NDArray[np.float64]) -> float:

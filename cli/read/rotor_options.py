@@ -13,7 +13,7 @@ from cli.read.options import bad, needed, quantity, refuse, two_bearings
 from dalembert.dataclass import dataclass, replace
 from dalembert.quantities import parse_quantity
 from dalembert.results.columns import Table, names, number
-from dalembert.units import SMALLEST, to_si
+from dalembert.units import SMALLEST, from_si, to_si, written
 
 
 def from_options(specs: Sequence[str], flag: str = "--plane", *, sought: bool = False) -> Planes:
@@ -87,6 +87,10 @@ class Tolerance:
     """U_per of the whole rotor, kg·m; with MIL that of each plane."""
     bearings: tuple[float, float] | None = None
     """Where along the shaft it holds, m; None: in the correction planes."""
+
+    def text(self, unit: str) -> str:
+        """Return it in a unit, as people write it: `60 g·mm`."""
+        return f"{from_si(self.permissible, 'unbalance', unit):.6g} {written(unit)}"
 
     @property
     def iso(self) -> bool:
