@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from itertools import chain
@@ -19,12 +20,25 @@ from cli import function_of
 from cli.show.commands import Declared, ShowOptions, with_options
 from dalembert.errors import DataError, one_line
 from dalembert.results.about import HEAD
+from dalembert.results.forms import (
+    first_of,
+    formed,
+    in_chosen_units,
+    json_document,
+    one_table,
+    unknown_digits,
+    with_digits_that_hold,
+    with_first,
+    with_further_cut,
+)
+from dalembert.tables.files import is_input
 from dalembert.terminal import coloured
 
 if TYPE_CHECKING:
     from dalembert.results.columns import Table
     from dalembert.results.expect import Comparison
-    from dalembert.results.result import Result
+    from dalembert.results.files import Form
+    from dalembert.results.result import Part, Result, Written
 
     Made = Callable[[], bytes | Iterable[bytes]]
 
@@ -56,20 +70,18 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
     if options.plot is not None and result.figure is None:
         result.warnings.append("--plot: there is no picture of this result")
     if result.blocks is not None:
-        from cli.show.files import stream
-
         check_renamed()
-        unknown = stream(result, form, options)
-        _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
+        unknown = _stream(result, form, options)
+        _warn([*result.warnings, *result.late_warnings(), *unknown_digits(unknown)], options)
         _note(result, options)
         if result.failed():
             raise typer.Exit(1)
         return
     if options.steps:
         result = _with_way(result)
-    result = _in_chosen_units(result, options.chosen_units)
-    whole = cache(_first(result))
-    result = _with_first(result, whole)
+    result = in_chosen_units(result, options.chosen_units)
+    whole = cache(first_of(result))
+    result = with_first(result, whole)
     checked = None
     if options.expect is not None:
         from dalembert.results.expect import compare
@@ -81,9 +93,9 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
         result.warnings.extend(checked.warnings)
     check_renamed()
     if options.digits:
-        result = _with_digits_that_hold(result)
+        result = with_digits_that_hold(result)
     # a report cuts the digits of each of its tables
-    pages = _report(_with_first(result, whole), options, call, checked)
+    pages = _report(with_first(result, whole), options, call, checked)
     if checked is not None:
         result = _with_check(result, checked)
     _write(result, options, pages)
@@ -100,20 +112,19 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
 
 def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> None:
     """Write the files; where one of them is an input, none."""
-    from cli.show.files import check_folders, refuse_inputs
     from dalembert.results.files import write_all
 
     output = options.output
     if options.digits and options.form != ".json":
-        result = _with_further_cut(result)
+        result = with_further_cut(result)
     files: dict[Path, Made] = {}
     if output is not None and options.holds_one:
         for name in result.companions:
             beside = output.with_name(f"{output.stem}-{name}{output.suffix}")
-            files[beside] = partial(_one_table, options.form, result.tables[name])
+            files[beside] = partial(one_table, options.form, result.tables[name])
     names = [path for path in (output, options.plot, *result.beside, *pages, *files) if path is not None]
-    refuse_inputs(names)
-    check_folders(names)
+    _refuse_inputs(names)
+    _check_folders(names)
     files |= {**result.beside, **pages}
     if options.plot is not None and result.figure is not None:
         from dalembert.drawing.sheet import drawn
@@ -121,10 +132,83 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
         figure = result.plotted or result.figure
         files[options.plot] = partial(drawn, figure, options.plot.suffix.lower()[1:])
     if output is not None:
-        files[output] = partial(_formed, result, options.form)
+        files[output] = partial(formed, result, options.form)
     write_all(files)
 
 
+# --- what is refused before a file is written, and tables that are written in parts ---------------------------------
+def _refuse_inputs(outputs: Iterable[Path]) -> None:
+    """Refuse outputs that are inputs of this call, or one another, before any of them is written."""
+    seen: set[str] = set()
+    for path in outputs:
+        if is_input(path):
+            raise typer.BadParameter(f"'{path}' is an input: expected another file; nothing was written")
+        name = os.path.realpath(path)
+        if name in seen:
+            raise typer.BadParameter(f"'{path}' is given twice: expected a file for each output")
+        seen.add(name)
+
+
+def _check_folders(paths: Iterable[Path]) -> None:
+    """Refuse the first file whose folder is missing, before any is written."""
+    for path in paths:
+        if not path.parent.is_dir():
+            raise DataError(f"{path}: cannot write: no folder {path.parent}")
+
+
+def _stream(result: Result, suffix: str, options: ShowOptions) -> int:
+    """Write a table that comes in parts, to standard output without a file; before it the files that go with it.
+
+    Returns
+    -------
+    int
+        Of how many numbers --digits knows no digit.
+    """
+    assert result.blocks is not None
+    from dalembert.results.columns import Table
+    from dalembert.results.files import Form, parquet, workbook, write, write_all
+
+    output, unknown = options.output, 0
+    # a bad unit is an error before anything is worked out
+    units = options.chosen_units
+    _refuse_inputs(path for path in (output, *result.beside) if path is not None)
+    write_all(result.beside)
+
+    def made(form: Form, blocks: Callable[[Form], Iterator[Written]]) -> Iterator[bytes | Part]:
+        nonlocal unknown
+        # what is left of the work is called off when the writing ends
+        with closing(blocks(form)) as parts:  # type: ignore[type-var]
+            for data, without in parts:
+                unknown += without
+                yield data
+
+    parts_written = made(Form(suffix, units, options.digits), result.blocks)
+    if suffix in (".csv", ".json"):
+        data = (data for data in parts_written if isinstance(data, bytes))
+        text = _document(result, data) if suffix == ".json" else data
+        if output is not None:
+            write(output, text)
+        else:
+            sys.stdout.writelines(part.decode() for part in text)
+            sys.stdout.flush()
+    elif output is not None:
+        tables = (data for data in parts_written if isinstance(data, Table))
+        write(output, parquet(tables) if suffix == ".parquet" else workbook({result.blocks_name: tables}))
+    return unknown
+
+
+def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
+    """The JSON document around its list."""
+    from dalembert.results.text import json_members
+
+    yield f'{{{json_members(result.documented())},\n "{result.blocks_name}": ['.encode()
+    yield from parts
+    # all warnings are there by now
+    lines = [*result.warnings, *result.late_warnings()]
+    yield f"\n ],{json_members({'warnings': lines})}\n}}\n".encode()
+
+
+# --- what is printed ----------------------------------------------------------------------------------------------------
 def _with_check(result: Result, checked: Comparison) -> Result:
     """Return the result with the check as its first table, and in its document."""
     from dalembert.results.columns import document as result_document
@@ -146,9 +230,9 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
 
     verdict = "" if checked is None else f"{table_text(checked.table.cells)}\n{checked.summary}"
     # JSON keeps every digit
-    every_digit, result = result, _with_further_cut(result) if options.digits else result
+    every_digit, result = result, with_further_cut(result) if options.digits else result
     if options.json:
-        sys.stdout.writelines(_json_parts(every_digit))
+        sys.stdout.writelines(json_document(every_digit))
         if checked is not None:
             print(verdict, file=sys.stderr)
     elif checked is not None:
@@ -158,7 +242,7 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
         text = paragraphs(result.notes(), *_tables_text(result, width), result.afterword())
         sys.stdout.write(coloured(text, sys.stdout, not options.no_color))
     elif options.output is None:
-        sys.stdout.write(csv_text(_first(result)().cells))
+        sys.stdout.write(csv_text(first_of(result)().cells))
     if options.steps and not options.json and options.form != ".json":
         from dalembert.results.result import way_text
 
@@ -222,15 +306,6 @@ def _tables_text(result: Result, width: int | None) -> Iterator[str]:
         yield table_block(table, width, ROWS, title)
 
 
-def _first(result: Result) -> Callable[[], Table]:
-    return next(iter(result.tables.values()))
-
-
-def _with_first(result: Result, table: Callable[[], Table]) -> Result:
-    """Return the result with another first table."""
-    return replace(result, tables={**result.tables, next(iter(result.tables)): table})
-
-
 def reported(options: str) -> Callable[[Callable[[SimpleNamespace, ShowOptions], Result]], Declared]:
     """Make a command of a function that returns the files to be written and what a report says of them.
 
@@ -241,11 +316,10 @@ def reported(options: str) -> Callable[[Callable[[SimpleNamespace, ShowOptions],
 
 
 def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
-    from cli.show.files import refuse_inputs
     from dalembert.results.files import write_all
 
     files = [*result.beside.items(), *_report(result, options, call).items()]
-    refuse_inputs(path for path, _ in files)
+    _refuse_inputs(path for path, _ in files)
     for note in result.warnings:
         print(f"note: {one_line(note)}", file=sys.stderr)
     write_all(dict(files))
@@ -277,102 +351,10 @@ def _report(
     return {path: partial(bytes, page) for path, page in files.items()}
 
 
-def _in_chosen_units(result: Result, units: Mapping[str, str] | None) -> Result:
-    """Return the result with its tables in the units that --units names."""
-    if units is None:
-        return result
-    from dalembert.results.chosen_units import in_units
-
-    def of(table: Callable[[], Table]) -> Callable[[], Table]:
-        return lambda: in_units(table(), units)
-
-    screen = result.screen
-    return replace(
-        result,
-        tables={name: of(table) for name, table in result.tables.items()},
-        screen=None if screen is None else lambda: [in_units(table, units) for table in screen()],
-        expected=[of(table) for table in result.expected],
-    )
-
-
-def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
-    """Return the file of -o."""
-    if form == ".json":
-        return (part.encode() for part in _json_parts(result))
-    if form == ".toml":
-        assert result.toml is not None
-        return result.toml()
-    if form in (".csv", ".parquet"):
-        return _one_table(form, _first(result))
-    # a table without columns is of the JSON document alone
-    every = ((name.strip("-"), table()) for name, table in result.tables.items())
-    formed = {name: table for name, table in every if table.columns}
-    if form == ".xlsx":
-        from dalembert.results.files import workbook
-
-        return workbook({name: [table] for name, table in formed.items()})
-    from dalembert.results.files import handed_on
-
-    return handed_on(form, formed, result.warnings)
-
-
-def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterable[bytes]:
-    """Return a file of a single table."""
-    if form == ".parquet":
-        from dalembert.results.files import parquet
-
-        return parquet([table()])
-    from dalembert.results.text import csv_text
-
-    return csv_text(table().cells).encode()
-
-
 def _warn(warnings: Iterable[str], options: ShowOptions) -> None:
     for warning in warnings:
         line = coloured(f"warning: {one_line(warning)}", sys.stderr, not options.no_color)
         print(line, file=sys.stderr)
-
-
-def _unknown(count: int) -> list[str]:
-    if not count:
-        return []
-    return [f"--digits: of {count} numbers no digit holds; their cells are empty"]
-
-
-def _json_parts(result: Result) -> Iterator[str]:
-    from dalembert.results.text import json_parts
-
-    return json_parts({**result.documented(), "warnings": result.warnings})
-
-
-def _with_digits_that_hold(result: Result) -> Result:
-    """Cut the first table and that of the terminal."""
-    from dalembert.results.digits import digits_that_hold
-
-    table, unknown = digits_that_hold(_first(result)())
-    screen = None
-    if result.screen is not None:
-        cut = cache(lambda of=result.screen: [digits_that_hold(table) for table in of()])
-
-        def screen() -> list[Table]:
-            return [table for table, _ in cut()]
-
-        if not any(column.error for column in table.columns):
-            unknown = sum(count for _, count in cut())
-    return replace(
-        _with_first(result, lambda: table),
-        warnings=[*result.warnings, *_unknown(unknown)],
-        screen=screen,
-    )
-
-
-def _with_further_cut(result: Result) -> Result:
-    """Cut the tables below the first, for files that are not JSON, which keeps every digit."""
-    from dalembert.results.digits import digits_that_hold
-
-    first, *others = result.tables.items()
-    cut = {name: lambda of=of: digits_that_hold(of())[0] for name, of in others}
-    return replace(result, tables={**dict([first]), **cut})
 
 
 _taken: list[list[Result]] = []
