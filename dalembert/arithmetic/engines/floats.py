@@ -24,7 +24,8 @@ class Floats:
     """The functions of floats, for `Tape.on`; they raise where Python's do."""
 
     const, binade = staticmethod(float), staticmethod(binade)
-    sqrt, sin, cos, atan2 = map(staticmethod, (math.sqrt, math.sin, math.cos, math.atan2))
+    sqrt, atan2 = staticmethod(math.sqrt), staticmethod(math.atan2)
+    sin, cos = staticmethod(math.sin), staticmethod(math.cos)
 
     @staticmethod
     def select(test: float, positive: float, otherwise: float) -> float:
