@@ -24,6 +24,7 @@ LEVEL = 0.05
 """The probability with which each test errs."""
 NEAR = 0.02  # masses within this share of the largest are a repeat
 HUBER = 1.5  # standard deviations of a component
+ROUNDS = 3000  # of weighted fits: near a reading that gains or loses its full weight a round may move it by a hundredth only
 MEDIAN = float(np.sqrt(2 * np.log(2)))  # of |·| of a circular vector with components of standard deviation 1
 
 
@@ -282,7 +283,7 @@ def _huber(
     count = fit.present.sum(axis=(-2, -1))
     grown = np.sqrt(count / np.maximum(fit.degrees_of_freedom, 1))
     current, sd = fit, np.zeros(())
-    for _ in range(200):
+    for _ in range(ROUNDS):
         size = np.where(fit.present, np.abs(current.residuals) * root, np.nan)
         sd = (
             (grown * np.nanmedian(size, axis=(-2, -1)) / MEDIAN)[..., None, None]

@@ -34,13 +34,14 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("runs",),
-        ("log_picture",),
+        ("cylinders", "log_picture", "placing"),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (
             "amplitudes",
             "engine",
             "known_masses",
             "log_balance",
+            "mode_shapes",
             "placement",
             "prior",
             "tolerance",
@@ -63,6 +64,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "indexing",
             "phase",
             "picture",
+            "planes",
             "rotor",
             "synchronous",
         ),
@@ -91,6 +93,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
+        ("rotation_in_time",),
+        ("turning_body",),
         ("parts", "robots"),
         ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
@@ -121,11 +125,11 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("documents", "results"),
-        ("drawing", "page", "tables"),
+        ("drawing", "page", "tables", "written"),
         ("arithmetic",),
         ("angles", "figures", "quantities"),
         ("units",),
-        ("dataclass", "decimals", "errors", "hints", "memory", "on_use"),
+        ("dataclass", "decimals", "errors", "hints", "memory", "on_use", "terminal"),
     ),
     "benchmarks": (
         ("__main__", "commands_page", "library_page", "page_pictures", "same_outputs", "trace_passes"),

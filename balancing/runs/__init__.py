@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,13 +10,21 @@ if TYPE_CHECKING:
     from balancing.runs.runs import Runs
 
 
-def read_runs(path: str | Path, *, without_phase: bool = False, lagging: bool = False) -> Runs:
+def read_runs(
+    path: str | Path,
+    influence: str | Path | Sequence[str | Path] = (),
+    *,
+    without_phase: bool = False,
+    lagging: bool = False,
+) -> Runs:
     """Read the runs of rotors from a table, a wide sheet or a log: readings, and the masses that were on.
 
     Parameters
     ----------
     path : str or Path
         CSV or workbook (docs/field-balancing.md has the layouts), or vectors in YAML or JSON.
+    influence : str, Path or several
+        Files of stored influence coefficients, as `dalembert field --save-influence` writes them; of sister machines too.
     without_phase : bool
         Whether amplitudes alone are read; the readings are then real.
     lagging : bool
@@ -27,12 +36,14 @@ def read_runs(path: str | Path, *, without_phase: bool = False, lagging: bool = 
         `groups` has the rotors that were measured in the same way side by side: g rotors, r rows of readings of the
         s `channels` (sensors, speeds, states), masses in the p `planes`. `readings` (g, r, s) are in the file's
         `amplitude_unit`, NaN where a row lacks a channel; `masses` (g, r, p) are those on the rotor, in kg, or kg·m
-        where the file has unbalances. `rotors` has their names, `warnings` what is doubtful.
+        where the file has unbalances. `rotors` has their names, `warnings` what is doubtful. With stored coefficients
+        `group.before.prior` has them, as `fit_with_prior` takes them; the planes are theirs.
 
     Raises
     ------
     DataError
-        The table cannot be read, its rows contradict each other, or no mass was ever on a rotor.
+        The table cannot be read, its rows contradict each other, no coefficient is stored for a sensor or a plane, or, without
+        stored coefficients, no mass was ever on a rotor.
 
     Examples
     --------
@@ -52,11 +63,32 @@ def read_runs(path: str | Path, *, without_phase: bool = False, lagging: bool = 
     >>> alpha = joint_fit(group.readings, group.masses).influence[0, 0, 0]
     >>> bool(abs(alpha - 2 / 0.01j) < 1e-12)
     True
+
+    A later run of this machine, with the coefficient that is stored (µm per g):
+
+    >>> from balancing import fit_with_prior, least_squares
+    >>> with TemporaryDirectory() as folder:
+    ...     today, stored = Path(folder, "today.csv"), Path(folder, "coefficients.csv")
+    ...     _ = today.write_text("run,sensor,amplitude_um,phase_deg\\ntoday,1,6,0\\n")
+    ...     _ = stored.write_text("sensor,plane,magnitude_per_g,phase_deg\\n1,A,0.2,-90\\n")
+    ...     (group,) = read_runs(today, stored).groups
+    >>> fit = fit_with_prior(group.readings, group.masses, group.before.prior)
+    >>> least_squares(fit.influence, fit.initial).corrections.round(9)
+    array([[0.-0.03j]])
     """
     from balancing.runs.reading import read_measured
+    from balancing.runs.stored_planes import in_stored_planes
 
-    measured = read_measured(str(path), (), fit=True, exclude=(), four_run=without_phase, against=lagging)
-    runs = measured.rows.rows.of
-    runs.groups = list(measured.rows.parts(None))
-    runs.warnings += [*runs.table.warnings, *measured.rows.warnings]
+    files = [influence] if isinstance(influence, (str, Path)) else influence
+    measured = read_measured(
+        str(path), [*map(str, files)], fit=True, exclude=(), four_run=without_phase, against=lagging
+    )
+    runs, stored = measured.rows.rows.of, measured.sisters
+    named = None if stored is None else [stored.key(name) for name in runs.rotors]
+    for group in measured.rows.parts(named):
+        if stored is not None:
+            group = in_stored_planes(group, runs, stored)
+            group.before = stored.before(runs.rotors[group.rotors[0]], group.channels, runs)
+        runs.groups.append(group)
+    runs.warnings += [*runs.table.warnings, *measured.warnings, *measured.rows.warnings]
     return runs

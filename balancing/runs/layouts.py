@@ -134,6 +134,7 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
 
 PHASE, TRIAL_ANGLE, ANGLE = words_of("phase"), words_of("trial_angle"), words_of("angle", "trial_angle")
 PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
+DIRECTION = ("direction", "axis", "richtung", "messrichtung", "achse")
 PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
 KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
 WHOLE = ("rotor", "run", "state", "speed", "weight", "ref", "use", "date", "trial_plane", "trial_kept")
@@ -184,7 +185,7 @@ class _Column:
 
 def long_form(source: Source) -> Source:
     """Return a table of runs with a row for each reading; of one that is such a table already only foreign names change."""
-    source = parted_cells(source)
+    source = _one_sensor(parted_cells(source))
     if not is_wide(source):
         return _translated(source)
     columns = list(_columns(source.headings))
@@ -215,6 +216,29 @@ def long_form(source: Source) -> Source:
             f"{source.file}: ignored the column{'s' * (len(left) > 1)} {', '.join(map(quote, left))}"
         )
     return _Long(source, columns, unit).source()
+
+
+def _one_sensor(source: Source) -> Source:
+    """Join the columns that name a sensor together, such as Lager and Richtung, or bearing and probe; of one named sensor nothing changes."""
+    every = source.headings
+    places = [
+        k for k, each in enumerate(every) if _is_foreign_sensor(each) or plain_word(each.base) in DIRECTION
+    ]
+    own = any(plain_word(each.base) == "sensor" for each in every)
+    if own or len(places) < 2 or not any(_is_foreign_sensor(every[k]) for k in places):
+        return source
+    source.check_cells(places)
+    first = places[0]
+    named = " and ".join(quote(every[k].written) for k in places)
+    source.warnings.append(f"{source.file}: read {named} together as sensor")
+    rows = []
+    for line, cells in source.full_rows():
+        joined = " ".join(cell for k in places if (cell := cells[k].strip()))
+        kept = [joined if k == first else cell for k, cell in enumerate(cells) if k not in places[1:]]
+        rows.append((line, kept))
+    headings = [each for k, each in enumerate(every) if k not in places[1:]]
+    headings[first] = Heading(every[first].written, "sensor")
+    return source.laid_out(headings, rows)
 
 
 def _translated(source: Source) -> Source:

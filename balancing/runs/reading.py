@@ -99,7 +99,7 @@ class _Reading:
         if not sizes and not files:
             raise DataError(
                 f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
-                f"or stored coefficients by --influence {table.hint}"
+                f"or stored influence coefficients {table.hint}"
             )
         size = sizes[0] if sizes else Cells("", files[0].unit, [""] * table.rows)
         names, rotor = table.numbered("rotor", "1")
@@ -179,7 +179,7 @@ class _Reading:
         try:
             phase = table.require("phase", "angle")
         except DataError as error:
-            raise DataError(f"{error}; of amplitudes alone: --method four-run") from None
+            raise DataError(f"{error}; amplitudes alone are for the four-run method") from None
         # a sensor that a run lacks may be a row with blank cells
         unread = unread & np.isnan(phase.values)
         expected = "a number, or amplitude and phase both blank"

@@ -358,7 +358,7 @@ class Sorted:
             of = self.rows.of.of(int(np.argmin(some)))
             raise DataError(
                 f"{self.rows.of.table.file}: {of}no trial run: no mass ever changed; expected a positive trial mass for every "
-                "plane, or stored coefficients by --influence"
+                "plane, or stored influence coefficients"
             )
 
     def _weights(self, mine: Rows, channels: _Listed) -> Real | None:

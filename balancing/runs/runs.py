@@ -315,6 +315,12 @@ class Runs:
         return "kg" if self.per == "mass" else "kg_m"
 
     @property
+    def unbalance_unit(self) -> str:
+        """The unit of unbalances: that of the table, oz·in for trial masses in oz or lb, else g·mm."""
+        of_masses = "oz_in" if self.mass_unit in ("oz", "lb") else "g_mm"
+        return self.mass_unit if self.per == "unbalance" else of_masses
+
+    @property
     def speed_unit(self) -> str:
         """The unit of the speeds that stand in the table."""
         return self.table.numbers["speed"].unit if "speed" in self.table.numbers else "rpm"

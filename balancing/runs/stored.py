@@ -342,7 +342,7 @@ def stored_alpha(alpha: Alpha) -> Stored:
 
 
 class Sisters:
-    """The files of `--influence` as prior knowledge of a fit: of the rotor they name, or of all machines in them."""
+    """Files of stored coefficients as prior knowledge of a fit: of the rotor they name, or of all machines in them."""
 
     def __init__(self, files: Sequence[Stored]) -> None:
         self.files = files
@@ -389,9 +389,7 @@ class Sisters:
         alpha = np.stack([one.alpha for one in each])
         stated = [one.covariance for one in each if one.covariance is not None]
         if stated and len(stated) < len(each):
-            runs.warnings.append(
-                "--influence: where a file states no uncertainty its coefficients count as exact"
-            )
+            runs.warnings.append("stored coefficients count as exact where their file states no uncertainty")
         covariance: Complex = np.stack(
             [
                 np.zeros((*one.alpha.shape, len(planes))) if one.covariance is None else one.covariance
@@ -404,11 +402,11 @@ class Sisters:
             prior = stored_prior(alpha[0], covariance[0], each[0].degrees_of_freedom)
             if self.key(rotor) is None and stated:
                 runs.warnings.append(
-                    "--influence: one machine's coefficients do not show how machines differ: they count with the errors of their "
-                    "own runs alone; expected the files of several machines, --influence once for each"
+                    "one machine's stored coefficients do not show how machines differ: they count with the errors of their "
+                    "own runs alone; expected a file of each of several machines"
                 )
             elif not stated:
-                runs.warnings.append("--influence: the coefficients state no uncertainty and count as exact")
+                runs.warnings.append("the stored coefficients state no uncertainty and count as exact")
         # of machines whose readings' deviation is known
         weight = np.array([one.degrees_of_freedom if one.reading_sd > 0 else 0.0 for one in each])
         freedom = float(weight.sum())

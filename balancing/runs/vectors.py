@@ -116,7 +116,11 @@ def _vectors(file: str, text: str) -> Layout:
     stored = "ALPHA" in values and "B" not in values
     for key in ("A",) if stored else ("A", "B", "U"):
         if key not in values:
-            more = ": its coefficients are for --influence" if key == "A" and "ALPHA" in values else ""
+            more = (
+                ": it has influence coefficients alone, as they are stored"
+                if key == "A" and "ALPHA" in values
+                else ""
+            )
             raise DataError(
                 f"{file}: no {key}: expected A (initial vectors), B (trial runs) and U (trial masses), or A and ALPHA{more}"
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.read.rotor_options import Planes
+    from balancing.planes import Planes
     from cli.show.commands import ShowOptions
     from dalembert.results.result import Result
     from dalembert.results.way import Topic
@@ -65,9 +66,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and all that needs it are loaded only once the command line itself is in order
+    from balancing.planes import read_planes
     from cli.balance.rotors import Balancing, Carried, Request, read_rotors
     from cli.balance.tables import METHOD, MODAL, tables, warnings
-    from cli.read.rotor_options import from_options, from_table, tolerance_of
+    from cli.read.rotor_options import from_options, tolerance_of
     from dalembert.results.result import Result
 
     if (options.plane is None) == (options.planes is None):
@@ -81,11 +83,14 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         refuse("shows rigid balancing: it does not go with --modes", mass=options.mass)
     shapes = None
     if options.modes is not None:
-        from cli.balance.modes import read_modes
+        from balancing.mode_shapes import read_modes
 
-        shapes = read_modes(options.modes, options.mode_count, options.rigid)
+        try:
+            shapes = read_modes(options.modes, options.mode_count, options.rigid)
+        except ValueError as error:
+            raise bad("--mode-count", error) from None
     chosen = (
-        from_table(options.planes)
+        read_planes(options.planes)
         if options.planes is not None
         else from_options(options.plane or [], sought=True)
     )
@@ -121,10 +126,10 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     with processes(options.workers) as executor:
         balancing = Balancing(rotors, chosen, request, executor)
 
-    def figure() -> Figure:
+    def figure(*, polygons: bool = False) -> Figure:
         from cli.balance.page import draw
 
-        return draw(balancing, polygons=show.steps)
+        return draw(balancing, polygons=polygons)
 
     def way() -> list[Topic]:
         from cli.balance.way import way
@@ -142,6 +147,8 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         beside={} if options.page is None else {options.page: sheet},
         head={"correction": "remove" if options.remove else "add"},
         figure=figure,
+        # the worked solution of a report has the polygons itself
+        plotted=partial(figure, polygons=show.steps),
         way=way,
         method=METHOD if shapes is None else MODAL,
         about={"title": "Balancing of known masses"},

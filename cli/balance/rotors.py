@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, correct, modal_corrections
-from cli.read.rotor_options import Planes, Tolerance, Verdict
+from balancing.planes import Planes
+from cli.read.rotor_options import Tolerance, Verdict
 from dalembert.angles import degrees, phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, field
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from balancing import ModalCorrection
-    from cli.balance.modes import Modes
+    from balancing.mode_shapes import Modes
     from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]

@@ -237,10 +237,9 @@ def verdicts(b: Balancing) -> Table:
     limit, unit = b.request.tolerance, b.rotors.unbalance_unit
     assert limit is not None
     rows = [(name, v) for r, name in enumerate(b.rotors.names) for v in b.verdicts(r)]
-    whole = from_si(limit.permissible, "unbalance", unit)
     named = f"{limit.grade}: " if limit.grade else ""
     each = " in each plane" if limit.whole_in_each_plane else ""
-    above = f"{named}U_per = {whole:.6g} {unit.replace('_', '·')}{each}"
+    above = f"{named}U_per = {limit.text(unit)}{each}"
     beyond = [name for name, v in rows if v.residual > v.permissible]
     below = ""
     if beyond or len(b.rotors.names) > 1:

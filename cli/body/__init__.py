@@ -1,7 +1,7 @@
 """The commands on bodies: which options each takes, and what it shows.
 
 `body` is mass properties and forces of a motion (`moving.py`, `tables.py`, `way.py`; a robot's tensors: `inertias.py`),
-`spin` the rotation in time (`rotation.py`, `states.py`).
+`spin` the rotation in time (`states.py`).
 """
 
 from __future__ import annotations
@@ -223,9 +223,10 @@ def spin(options: SimpleNamespace, show: ShowOptions) -> Result:
     import numpy as np
 
     from cli.body import states
-    from cli.body.rotation import Rotation, read_body
     from cli.read.root_search import pair, with_found
     from dalembert.results.result import Result
+    from rigidbody3d.rotation_in_time import Rotation
+    from rigidbody3d.turning_body import read_body
 
     if options.time is not None and options.at:
         raise bad("--at", "expected --time or --at, not both")

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.body.rotation import Rotation, TurningBody
 from cli.read import root_search
 from cli.read.options import bad
 from dalembert.drawing.sheet import blank
@@ -20,11 +19,13 @@ from dalembert.results.way import Topic, figures
 from rigidbody3d import check
 from rigidbody3d.attitude import rotate
 from rigidbody3d.picture.rotation import rotation as draw_rotation
+from rigidbody3d.rotation_in_time import Rotation
+from rigidbody3d.turning_body import TurningBody
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.body.rotation import Array
+    from rigidbody3d.rotation_in_time import Array
 
 
 METHOD = (

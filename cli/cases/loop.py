@@ -18,11 +18,11 @@ from cli.cases.cases import naming
 from cli.cases.remarks import Remarks
 from cli.read.options import bad, processes
 from cli.read.root_search import with_found
-from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table
 from dalembert.results.result import Result, Written
+from dalembert.terminal import progress
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 METHOD = (
     "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
     "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
-    "21940-11. The masses are at the radius of the trial masses."
+    "21940-11, API (4W/N) or MIL-STD-167-1. The masses are at the radius of the trial masses."
 )
 FEWEST_DRAWS = 40  # they give a standard deviation to a ninth
 REQUESTED = (

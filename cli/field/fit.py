@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from balancing.reading_errors import Errors
 from balancing.runs.reading import Measured, read_measured
 from balancing.runs.runs import SHOWN, Before, Complex, Group, Rows, Runs
 from balancing.runs.stored import Stored, read_runout
+from balancing.runs.stored_planes import in_stored_planes
 from cli.read import options
 from cli.read.rotor_options import Tolerance
 from dalembert.errors import DataError, quote
@@ -178,8 +179,8 @@ class _Groups:
 
     def _determined(self, group: Group) -> list[Group]:
         """Part a group into those whose runs determine the same channels; what they do not determine is left out."""
-        if self.sisters is not None or self.stored is not None:
-            return [self._in_stored_planes(group)]
+        if coefficients := self.sisters or self.stored:
+            return [in_stored_planes(group, self.runs, coefficients)]
         present = np.isfinite(group.readings)
         if self.request.four_run:
             keep = np.asarray(np.isfinite(group.means).all(axis=1))
@@ -239,44 +240,6 @@ class _Groups:
         return (
             f"{self.runs.of(group.rotors[i])}sensor {group.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
             f"does not determine {1 + len(group.planes)} unknowns: {clause}{_missing(group.planes, masses)}"
-        )
-
-    def _in_stored_planes(self, group: Group) -> Group:
-        """Return rotors with the planes whose coefficients are stored; a table that names none has the only one."""
-        coefficients, of = self.sisters or self.stored, self.runs.of(group.rotors[0])
-        assert coefficients is not None
-        covered = coefficients.planes(self.runs.rotors[group.rotors[0]])
-        planes = group.planes
-        if len(covered) == 1 and "trial_plane" not in self.runs.table.texts:
-            planes = covered[: len(planes)]
-        at = [covered.index(plane) if plane in covered else -1 for plane in planes]
-        for own, plane in enumerate(planes):
-            if at[own] < 0 and group.masses[..., own].any():
-                raise DataError(
-                    f"{self.runs.table.file}: {of}a mass in plane {plane}, which has no stored coefficient: expected "
-                    f"{', '.join(covered)}"
-                )
-            if at[own] < 0 and group.standing[:, own].any():
-                self.runs.warnings.append(
-                    f"{of}the last run has a mass in plane {plane}, which has no stored coefficient: the trim leaves it out"
-                )
-        if self.runs.other_masses:
-            at = [-1] * len(at)
-            self.runs.warnings.append(
-                f"{of}the stored coefficients are per {self.runs.per}, and the runs have other masses: what is on the rotor in "
-                "its last run is not known, and the trim leaves it out"
-            )
-        kept, there = [k for k, p in enumerate(at) if p >= 0], [p for p in at if p >= 0]
-        masses, standing = (
-            np.zeros((*of.shape[:-1], len(covered)), dtype=complex) for of in (group.masses, group.standing)
-        )
-        masses[..., there], standing[..., there] = group.masses[..., kept], group.standing[..., kept]
-        return replace(
-            group,
-            planes=covered,
-            masses=masses,
-            standing=standing,
-            exact=lambda: group.exact().in_planes(kept, there, len(covered)),
         )
 
     # -- the fit ---------------------------------------------------------------------------------------------

@@ -15,7 +15,11 @@ from balancing.weights import ENOUGH
 from cli.field.field_balancing import FieldBalancing, Solved
 from cli.field.rotor import Rotor
 from dalembert.angles import degrees
+from dalembert.errors import quote
+from dalembert.tables.headers import plain_word
 
+LAGS = {"lag", "lags", "lagging", "nacheilend", "nacheilung"}
+"""Words of a header of phases that lag."""
 NEARLY = 0.1  # a plane whose effect others bring about but for this share counts as nearly dependent
 
 
@@ -54,8 +58,14 @@ def _not_turned(b: FieldBalancing) -> Iterator[str]:
 
 
 def _other_sense(b: FieldBalancing) -> Iterator[str]:
-    """Name the stored coefficients of a phase that lags where the phases of the runs were not reversed, and the other way round."""
+    """Name the headers and stored coefficients of a phase that lags where the phases of the runs were not reversed, and the other way round."""
     leads = b.request.lagging is None and not all(b.against(solved.group).all() for solved in b.solved)
+    phase = b.runs.table.numbers.get("phase")
+    if leads and phase is not None and LAGS.intersection(plain_word(phase.header).split("_")):
+        yield (
+            f"{b.runs.table.file}: the header {quote(phase.header)} says that the phase lags, and the phases were not reversed: add "
+            "--phase-lag, or the angles are wrong; if the phase of this instrument leads, add --rotation ccw"
+        )
     for file, lagged in b.runs.stored_lags.items():
         if lagged and leads:
             yield (

@@ -24,7 +24,6 @@ from dalembert.results.bars import Bar, Bars
 from dalembert.results.columns import Column, Table
 from dalembert.results.result import Section, Sheet
 from dalembert.results.text import with_uncertainty
-from dalembert.units import from_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,11 +122,11 @@ class _Pages:
             yield Table([*columns, Column("verdict", "", [verdict])])
         tolerance = b.request.tolerance
         if tolerance is not None:
-            whole = from_si(tolerance.permissible, "unbalance", "g_mm")
+            whole = tolerance.text(b.runs.unbalance_unit)
             grade = f" {tolerance.grade}" if tolerance.grade else ""
             planes = self.rotor.verdicts(measured=last is not None)
-            yield f"Residual unbalance {how}; tolerance{grade}: {whole:.6g} g·mm, {tolerance.sharing}."
-            yield _rows_of(verdict_table([("", v) for v in planes], "g_mm"), slice(None))
+            yield f"Residual unbalance {how}; tolerance{grade}: {whole}, {tolerance.sharing}."
+            yield _rows_of(verdict_table([("", v) for v in planes], b.runs.unbalance_unit), slice(None))
         if last is None:
             yield (
                 "No run with the corrections on is among these: measure one, add it to the table, and the verdict is on what was "

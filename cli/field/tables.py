@@ -435,10 +435,10 @@ def tolerance(b: FieldBalancing) -> Table:
 
     limit = b.request.tolerance
     assert limit is not None
-    table = verdict_table([(rotor.name, v) for rotor in each(b) for v in rotor.verdicts()], "g_mm")
-    whole = from_si(limit.permissible, "unbalance", "g_mm")
+    unit = b.runs.unbalance_unit
+    table = verdict_table([(rotor.name, v) for rotor in each(b) for v in rotor.verdicts()], unit)
     named = f"{limit.grade}: " if limit.grade else ""
-    return replace(table, above=f"{named}U_per = {whole:.6g} g·mm, {limit.sharing}; residual as predicted")
+    return replace(table, above=f"{named}U_per = {limit.text(unit)}, {limit.sharing}; residual as predicted")
 
 
 def static_couple(b: FieldBalancing, part: int) -> Table:

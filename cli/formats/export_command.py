@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from cli.read.options import bad
 from cli.show.output import reported
 from dalembert.errors import DataError
-from virtualwork.exchange.export import FORMATS
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
@@ -49,7 +48,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from dalembert.tables.files import name_of
     from virtualwork import MechanismError
     from virtualwork.exchange.drawing import SeveralInputs, cam_bytes
-    from virtualwork.exchange.export import file_bytes
+    from virtualwork.exchange.export import FORMATS, file_bytes
 
     output, file, profile = Path(options.output), options.file, options.profile
     suffix = output.suffix.lower()

@@ -2,7 +2,7 @@
 
 `mechanism`, `forces`, `inspect`, `equilibrium`, `simulate`, `tolerance` and `fit` each have one study here (`poses.py`,
 `cycle.py`, `inspection.py`, `equilibria.py`, `simulation.py`, `tolerances.py`, `fits.py`), which `cli/cases` runs for
-every case.
+every case. `work` balances a table of link states without a mechanism (`virtual_power.py`).
 """
 
 from __future__ import annotations
@@ -363,12 +363,18 @@ def work(options: SimpleNamespace, _: ShowOptions) -> Result:
     need as many fields of virtual velocities, named in a column field.
     """
     g = 0j if options.gravity is None else plane_vector("--gravity", options.gravity, "acceleration")
-    from cli.mechanism.link_states import read_states
-    from cli.mechanism.virtual_power import METHOD, WorkBalance, draw, tables, way
+    from cli.mechanism.virtual_power import METHOD, draw, tables, way
     from dalembert.results.result import Result
+    from virtualwork.textbook.state_table import read_states
+    from virtualwork.textbook.table_balance import WorkBalance
 
     table = read_states(options.states)
     balance = WorkBalance(table, g)
+    weightless = (
+        ["--gravity: there is no column mass_*: no weights from it"]
+        if g and "mass" not in table.values
+        else []
+    )
 
     return Result(
         tables=tables(balance, ledger_first=options.ledger),
@@ -376,5 +382,5 @@ def work(options: SimpleNamespace, _: ShowOptions) -> Result:
         method=METHOD,
         way=partial(way, balance),
         about={"title": "Balance of virtual power"},
-        warnings=[*table.table.warnings, *table.warnings, *balance.warnings],
+        warnings=[*table.table.warnings, *table.warnings, *weightless, *balance.warnings],
     )

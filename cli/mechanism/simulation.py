@@ -17,13 +17,13 @@ from cli.cases.remarks import idle_friction
 from cli.mechanism.motion_tables import ENERGY, columns_of, documents, drift, inputs_of, trusted, way
 from cli.read import options
 from cli.show.commands import ShowOptions
-from cli.show.terminal import progress_in_time
 from dalembert.arithmetic.engines import anew
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
 from dalembert.results.chosen_units import shown as on_page
 from dalembert.results.columns import Column, Table, names
 from dalembert.tables.files import name_of
+from dalembert.terminal import progress_in_time
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking

@@ -1,7 +1,7 @@
 """The commands on rotors that are small: which options each takes, and what it shows.
 
-Each has its tables beside it: `trial` (`trial_mass.py`), `signal` (`recording.py`), `place` (`placing.py`, `placed.py`),
-`index` (`positions.py`), `engine` (`cylinders.py`, `orders.py`), `flywheel` (`turns.py`). `balance` and `field` have
+Each has its tables beside it: `trial` and `signal` (`before_field.py`), `place` (`placed.py`),
+`index` (`positions.py`), `engine` (`orders.py`), `flywheel` (`turns.py`). `balance` and `field` have
 folders of their own.
 """
 
@@ -19,7 +19,7 @@ from dalembert.quantities import parse_number
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from cli.rotor.placing import Drill
+    from balancing.placing import Drill
     from cli.show.commands import ShowOptions
     from dalembert.results.result import Result
     from dalembert.results.way import Topic
@@ -40,7 +40,7 @@ def trial(options: SimpleNamespace, _: ShowOptions) -> Result:
 
     Its centrifugal force is a tenth of the static load of each plane.
     """
-    from cli.rotor.trial_mass import RULE, suggestion, way
+    from cli.rotor.before_field import RULE, suggestion, way_of_trial
     from dalembert.results.result import Result
 
     mass = needed("--rotor-mass", options.rotor_mass, "mass", positive=True)
@@ -48,7 +48,7 @@ def trial(options: SimpleNamespace, _: ShowOptions) -> Result:
     radius = needed("--radius", options.radius, "length", positive=True)
 
     return Result(
-        way=partial(way, mass, speed, radius, options.planes),
+        way=partial(way_of_trial, mass, speed, radius, options.planes),
         tables={"trial": partial(suggestion, mass, speed, radius, options)},
         method=f"Rule: {RULE}.",
         about={"title": "Trial mass"},
@@ -70,13 +70,17 @@ def signal(options: SimpleNamespace, _: ShowOptions) -> Result:
     FILE has the columns t_*, mark (once per turn; tacho, keyphasor, pulse and trigger are other names) and a column of
     vibration for each sensor: A_um, B_um, acceleration_m_s2. The rows of the result are readings for dalembert field.
     """
-    from cli.rotor.recording import read_recording, vectors, way
+    from balancing.runs.recording import read_recording
+    from cli.rotor.before_field import vectors, way_of_recording
     from dalembert.results.result import Result
 
-    read = read_recording(options.recording, options.pulses)
+    try:
+        read = read_recording(options.recording, options.pulses)
+    except ValueError as error:
+        raise bad("--pulses", error) from None
 
     return Result(
-        way=partial(way, read),
+        way=partial(way_of_recording, read),
         tables={"signal": lambda: vectors(read)},
         head={"amplitude_unit": read.unit},
         about={"title": "Vibration once per turn"},
@@ -126,12 +130,12 @@ def place(options: SimpleNamespace, show: ShowOptions) -> Result:
     Several corrections are added as vectors first. Without --positions or --blades the result is one mass. In a FILE
     each plane of each rotor is placed on its own.
     """
-    from cli.rotor.placed import METHOD, draw, tables, way
-    from cli.rotor.placing import Placing, Request, read_corrections
+    from balancing.placing import Placing, Request
+    from cli.rotor.placed import METHOD, corrections_of, draw, tables, way
     from dalembert.results.result import Result, Section, Sheet
     from dalembert.results.text import heading
 
-    every = read_corrections(options.corrections, options.rotor, options.plane)
+    every = corrections_of(options.corrections, options.rotor, options.plane)
     stated = (
         []
         if options.remove or not every[0].removed
@@ -226,7 +230,7 @@ def _drill(drill: str | None, density: str | None, drill_point: str, max_depth: 
     """Read --drill and what goes with it."""
     from fractions import Fraction
 
-    from cli.rotor.placing import Drill
+    from balancing.placing import Drill
 
     diameter = quantity("--drill", drill, "length", positive=True)
     rho = quantity("--density", density, "density", positive=True)
@@ -313,9 +317,9 @@ def engine(options: SimpleNamespace, _: ShowOptions) -> Result:
     counter-clockwise from +x (default 90). Forces are those on the frame, couples are Σ z·F about z = 0. One shaft
     balances a force; two of one order and sense balance force and couple.
     """
+    from balancing.cylinders import Engine, read_cylinders
     from cli.read.rotor_options import from_options
-    from cli.rotor.cylinders import Engine, read_cylinders, read_shafts
-    from cli.rotor.orders import METHOD, draw, tables, warnings, way
+    from cli.rotor.orders import METHOD, draw, read_shafts, tables, warnings, way
     from dalembert.results.result import Result
 
     if options.speed is None:

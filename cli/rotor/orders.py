@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from balancing.cylinders import Engine, Shaft
 from balancing.engine import Forces, piston_orders
-from cli.rotor.cylinders import Engine
+from cli.read import options
 from dalembert.angles import degrees
 from dalembert.arithmetic.shapes import is_doubled
 from dalembert.drawing.amounts import prefixed
 from dalembert.drawing.polar import head
 from dalembert.drawing.sheet import blank, plain, sheet
+from dalembert.errors import quote
 from dalembert.results.columns import Column, Table, computed, names, number
 from dalembert.results.way import Topic, figures
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.rotor.cylinders import Complex, Real
+    from balancing.cylinders import Complex, Real
 
 
 METHOD = (
@@ -34,6 +36,28 @@ METHOD = (
 
 KINDS = (("force", "force", False), ("couple", "torque", True))
 """Forces and couples: their name, their dimension, and whether they are couples."""
+
+
+def read_shafts(texts: Sequence[str], highest: int) -> list[Shaft]:
+    """Read `ORDER:Z:with` or `ORDER:Z:against`."""
+    shafts: list[Shaft] = []
+    for text in texts:
+        parts = [part.strip() for part in text.split(":")]
+        if len(parts) != 3 or parts[2] not in ("with", "against") or options.whole(parts[0]) < 1:
+            raise options.bad(
+                "--shaft", f"'{text}': expected ORDER:Z:with or ORDER:Z:against, such as 2:150mm:against"
+            )
+        shaft = Shaft(
+            options.whole(parts[0]), options.needed("--shaft", parts[1], "length"), parts[2] == "against"
+        )
+        if shaft.order > highest:
+            raise options.bad(
+                "--shaft", f"'{text}': order {parts[0]} is above the highest: expected --order {parts[0]} too"
+            )
+        if any((s.order, s.z, s.against) == (shaft.order, shaft.z, shaft.against) for s in shafts):
+            raise options.bad("--shaft", f"'{text}': two shafts of one order and sense at one place")
+        shafts.append(shaft)
+    return shafts
 
 
 def tables(e: Engine) -> dict[str, Callable[[], Table]]:
@@ -182,7 +206,7 @@ def warnings(e: Engine) -> list[str]:
     lines = [
         text
         for shaft, unbalance in zip(e.shafts, e.shaft_unbalances, strict=True)
-        if (text := e.idle(shaft, unbalance))
+        if (text := idle(e, shaft, unbalance))
     ]
     if not e.cylinders.reciprocating.any():
         lines.append("every reciprocating mass is zero: all orders are zero")
@@ -194,6 +218,22 @@ def warnings(e: Engine) -> list[str]:
     if e.share and not e.cylinders.rotating.any() and "rotating" not in e.cylinders.table.numbers:
         lines.append("no column rotating_*: the counterweights are for the reciprocating masses alone")
     return lines
+
+
+def idle(e: Engine, shaft: Shaft, unbalance: complex) -> str:
+    """Say why a shaft has nothing to balance; empty where it has."""
+    if unbalance:
+        return ""
+    couple = e.on_the_crank.turning(shaft.order, shaft.against, couple=True)
+    named = quote(f"{shaft.order}:{shaft.z:g}m:{'against' if shaft.against else 'with'}")
+    if couple:
+        return (
+            f"--shaft {named}: order {shaft.order} has a couple but no force in this sense: one shaft cannot balance it; "
+            "add a second one at another place"
+        )
+    return (
+        f"--shaft {named}: order {shaft.order} has no force in this sense: the shaft has nothing to balance"
+    )
 
 
 ROWS = 3

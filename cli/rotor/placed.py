@@ -1,21 +1,24 @@
-"""Results of a placement: masses on their places, corrections and errors, planes; their digits, picture, worked solution."""
+"""The corrections that are placed, and results: masses on their places, corrections and errors, planes; their digits, picture, worked solution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from balancing import drill_depth
 from balancing.picture import Places, places
+from balancing.placing import Correction, Drill, Placed, Placing, Share, Vector, read_corrections
 from balancing.weights import angles_again
-from cli.rotor.placing import Drill, Placed, Placing, Share
+from cli.read import options
 from dalembert.angles import degrees, phasor
 from dalembert.drawing.sheet import blank
 from dalembert.results.columns import Column, Table, names, number
 from dalembert.results.way import Topic, figures, vector_text
+from dalembert.tables.files import SUFFIXES, split_sheet
 from dalembert.units import from_si
 
 if TYPE_CHECKING:
@@ -30,6 +33,29 @@ METHOD = (
     "filled first (least total mass, by linear programming duality); weights from stock by the choice of least error, all "
     "choices compared; weights of fixed mass as the sides of a polygon on a circle, which the correction closes."
 )
+
+
+def corrections_of(words: list[str], rotor: str | None, plane: str | None) -> list[Correction]:
+    """Read MASS@ANGLE ..., or one file, with the rotor and the plane to choose from it."""
+    if _is_file(words[0]):
+        if len(words) > 1:
+            raise options.bad("MASS@ANGLE", f"'{words[1]}': expected nothing in addition to a file")
+        return read_corrections(words[0], rotor, plane)
+    options.refuse("chooses among the corrections of a file: expected a file", rotor=rotor, plane=plane)
+    return [Correction("1", "1", [_vector_of(word) for word in words])]
+
+
+def _is_file(text: str) -> bool:
+    """Whether an argument is a file, not a MASS@ANGLE."""
+    path, _ = split_sheet(text)
+    suffix = Path(path).suffix.lower() in (".csv", ".txt", ".json", *SUFFIXES)
+    return text == "-" or suffix or ("@" not in text and Path(path).is_file())
+
+
+def _vector_of(spec: str) -> Vector:
+    """Read `83.5g@308.87deg`."""
+    expected = f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg"
+    return Vector(*options.mass_at("MASS@ANGLE", spec, spec, "mass", expected))
 
 
 def tables(placings: Sequence[Placing]) -> dict[str, Callable[[], Table]]:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
 
-from cli.read.options import HEAD, bad, column_names
+from cli.read.options import bad, column_names
+from dalembert.results.about import HEAD
 
 if TYPE_CHECKING:
     from dalembert.results.result import Result

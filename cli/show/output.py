@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cli import function_of
-from cli.read.options import HEAD
 from cli.show.commands import Declared, ShowOptions, with_options
-from cli.show.terminal import coloured
 from dalembert.errors import DataError, one_line
+from dalembert.results.about import HEAD
+from dalembert.terminal import coloured
 
 if TYPE_CHECKING:
     from dalembert.results.columns import Table
@@ -118,7 +118,8 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     if options.plot is not None and result.figure is not None:
         from dalembert.drawing.sheet import drawn
 
-        files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])
+        figure = result.plotted or result.figure
+        files[options.plot] = partial(drawn, figure, options.plot.suffix.lower()[1:])
     if output is not None:
         files[output] = partial(_formed, result, options.form)
     write_all(files)

@@ -235,8 +235,8 @@ def _grids(table: Table) -> Iterator[Part]:
     kept = range(0, length, every) if thinned else range(min(length, ROWS))
     headers: list[str] = []
     texts: list[list[str]] = []
-    for column in table.columns:
-        values = without_noise(_known(column, kept), column.unit)
+    certain = [replace(column, values=_known(column, kept)) for column in table.columns]
+    for column, values in zip(table.columns, without_noise(certain), strict=True):
         cells = [
             "yes" if v is True else "no" if v is False else t
             for v, t in zip(values, printed(column.header, values), strict=True)
@@ -306,7 +306,7 @@ body { font: 10pt/1.4 "Helvetica Neue", Arial, "Liberation Sans", sans-serif; co
   max-width: 184mm; margin: 8mm auto; padding: 0 4mm; overflow-wrap: anywhere }
 h1 { font-size: 16pt; line-height: 1.2; margin: 0 0 2mm }
 h2 { font-size: 13pt; margin: 5mm 0 1mm } h3 { font-size: 11pt; margin: 4mm 0 1mm; border-bottom: .3mm solid #999 }
-h2, h3 { break-after: avoid }
+h2, h3, p:has(+ .wide) { break-after: avoid } footer { break-inside: avoid }
 dl { display: grid; grid-template-columns: fit-content(40%) 1fr; gap: 0 4mm; margin: 0 0 3mm } dt { color: #555 } dd { margin: 0 }
 p { margin: 1.5mm 0; white-space: pre-wrap } pre { font: 8pt/1.3 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 table { border-collapse: collapse; margin: 1.5mm 0 2.5mm; font-size: 9pt; max-width: 100% } thead { display: table-header-group }

@@ -77,6 +77,8 @@ class Result:
     aside: Callable[[], Sequence[str]] = lambda: ()
     """Requested results that stand in no table: lines for standard error, where the table alone is shown."""
     figure: Callable[[], Figure] | None = None
+    plotted: Callable[[], Figure] | None = None
+    """The picture of --plot, where it shows more than that of the report."""
     method: str = ""
     """The method and its source, for the report."""
     sheets: Callable[[], Iterable[Sheet]] | None = None
@@ -146,7 +148,8 @@ def table_block(table: Table, width: int | None, rows: int | None = None, title:
 
     if title and table.columns and not table.length:
         return f"{title.removesuffix(':')}: none\n"
-    cells = {column.header: without_noise(column.values, column.unit)[:rows] for column in table.columns}
+    shown = zip(table.columns, without_noise(table.columns), strict=True)
+    cells = {column.header: values[:rows] for column, values in shown}
     more = f"… and {table.length - rows} further rows" if rows and table.length > rows else ""
     parts = (title or table.above, table_text(cells, table.keys, width), more, table.below)
     return "".join(part.rstrip("\n") + "\n" for part in parts if part)

@@ -293,7 +293,7 @@ _WORDS = {
     "rotor": "rotor machine maschine laeufer maquina",
     "name": "name bezeichnung benennung nome nombre nom teil",
     "run": "run lauf messlauf messung corrida rodada medicao marcha medicion ensayo essai mesure lancement",
-    "sensor": "sensor bearing lager lagerstelle aufnehmer messstelle messpunkt messebene transdutor captador sonda capteur point_de_mesure",
+    "sensor": "sensor bearing probe transducer pickup lager lagerstelle aufnehmer messstelle messpunkt messebene messkanal transdutor captador sonda capteur point_de_mesure",
     "speed": "speed drehzahl velocidade rotacao velocidad velocidad_de_giro vitesse vitesse_de_rotation n rpm",
     "amplitude": "amplitude amp schwingung schwingungen schwingweg schwinggeschwindigkeit schwingbeschleunigung vibration vibracao "
     "vibracion amplitud displacement velocity acceleration valor wert",

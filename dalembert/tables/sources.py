@@ -27,6 +27,10 @@ LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 _CONTROLS = bytes([*range(9), *range(14, 32), 127])
 DASHES = ("-", "\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _QUOTED = re.compile(r'"[^"]*"')
+_COMMENT = re.compile(r"^\s*#(?!\d)", re.MULTILINE)
+# a number whose comma may stand between thousands; one that has no mark there
+_GROUPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2},\d{3}(?![\d.,])")
+_UNGROUPED = re.compile(r"\d{4}")
 # rows from which importing pandas pays
 LARGE = 10_000
 OTHERS = {"<": "XML or HTML", "{": "JSON"}  # how files begin that are no tables
@@ -67,11 +71,29 @@ class Source:
     def large(self) -> bool:
         """Whether pandas pays, and can read the text as it is."""
         plain = not (self.records or self.above or self.units_below or self.unnamed_first)
-        return plain and self.sheet is None and self.text.count("\n") >= LARGE
+        return (
+            plain and not _COMMENT.search(self.text) and self.sheet is None and self.text.count("\n") >= LARGE
+        )
 
     def has_commas(self, columns: Iterable[Iterable[str]]) -> bool:
-        """Return whether these cells have decimal commas: no comma separates cells, and a cell contains one."""
-        return self.delimiter != "," and any("," in cell for column in columns for cell in column)
+        """Return whether these cells have decimal commas: no comma separates cells, and a cell contains one.
+
+        Warn where each may be one between thousands too.
+        """
+        if self.delimiter == ",":
+            return False
+        cells = [cell for column in columns for cell in column]
+        with_comma = [cell for cell in cells if "," in cell]
+        doubtful = bool(with_comma) and all(_GROUPED.search(cell) for cell in with_comma)
+        if doubtful and not any(map(_UNGROUPED.search, cells)):
+            number = _GROUPED.findall(with_comma[0])[0]
+            warning = (
+                f"{self.file}: read {quote(number)} as {float(number.replace(',', '.')):g}, with a decimal comma; "
+                f"write {number.replace(',', '')} if the comma is between thousands"
+            )
+            if warning not in self.warnings:
+                self.warnings.append(warning)
+        return bool(with_comma)
 
     def everything(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line, cells) of every row that is not blank."""
@@ -95,8 +117,20 @@ class Source:
             raise DataError(f"{self.file}: line {line}: {error}: expected CSV with balanced quotes") from None
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Yield (line, cells) of every row of data."""
-        return islice(self.everything(), self.above + 1 + self.units_below, None)
+        """Yield (line, cells) of every row of data; comments in lines of their own are left out."""
+        width, below = len(self.headings), islice(self.everything(), self.above + 1 + self.units_below, None)
+        return (row for row in below if not _is_comment(row[1], width))
+
+    def full_rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield (line, cells) of every row of data, as many cells as the header has; a row with fewer or more is refused."""
+        width = len(self.headings)
+        for k, (line, cells) in enumerate(self.rows(), 1):
+            if len(cells) < width or any(cell.strip() for cell in cells[width:]):
+                many = "s" * (len(cells) != 1)
+                raise DataError(
+                    f"{self.file}: row {k} (line {line}): found {len(cells)} cell{many}, expected {width}"
+                )
+            yield line, cells[:width]
 
     def laid_out(self, headings: Sequence[Heading], rows: Iterable[tuple[int, list[str]]]) -> Source:
         """Return the table with other columns, and the rows of data that it then has."""
@@ -309,6 +343,16 @@ def _some(names: Sequence[str]) -> str:
     """List a few names, and how many more there are."""
     few = ", ".join(names[:SHOWN])
     return f"{few} and {len(names) - SHOWN} more" if len(names) > SHOWN else few
+
+
+def _is_comment(cells: Sequence[str], width: int) -> bool:
+    """Whether a row of a table of several columns is a comment: # and words, in one cell or a number of cells of its own.
+
+    >>> [_is_comment(cells, 3) for cells in (["# end", "", ""], ["# by Ann", " at noon"], ["#A", "5", "7"], ["#1", "", ""])]
+    [True, True, False, False]
+    """
+    marked = width > 1 and bool(cells) and bool(_COMMENT.match(cells[0]))
+    return marked and (len(cells) != width or not any(cell.strip() for cell in cells[1:]))
 
 
 def _is_number(cell: str) -> bool:

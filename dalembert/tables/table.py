@@ -331,15 +331,7 @@ def _number_expected(text: str, decimal_comma: bool) -> str:
 
 def _read_small(source: Source, table: Table, columns: Sequence[_Column], marker: str) -> None:
     width = len(source.header)
-    rows: list[list[str]] = []
-    for line, record in source.rows():
-        if len(record) != width:
-            if len(record) < width or any(cell.strip() for cell in record[width:]):
-                raise DataError(
-                    f"{source.file}: row {len(rows) + 1} (line {line}): found {len(record)} cell{'s' * (len(record) != 1)}, expected {width}"
-                )
-            record = record[:width]
-        rows.append(record)
+    rows = [cells for _, cells in source.full_rows()]
     table.rows = len(rows)
     written = list(zip(*rows, strict=True)) or [()] * width
     decimal_comma = source.has_commas(written[each.place] for each in columns if each.kind != "text")

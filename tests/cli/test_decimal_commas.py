@@ -142,3 +142,52 @@ def test_bars_part_cells_with_decimal_commas(tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_text("mass, g|radius, mm|angle, deg\n1,5|20,5|30,25\n2,5|21,5|40,5\n")
     table = read(str(tmp_path / "table.csv"), numbers={"mass": "mass", "radius": "length", "angle": "angle"})
     assert table.numbers["angle"].values.tolist() == [30.25, 40.5]
+
+
+ONE = "name;mass_g;radius_mm;angle_deg\n"
+
+
+@pytest.mark.parametrize(
+    ("rows", "doubtful"),
+    [
+        ("A;1,010;20;0", True),
+        ("A;12,500;20;0\nB;3;20;90\nC;1,125;30,250;90", True),
+        ("A;1,010;20;0\nB;1,5;20;90", False),
+        ("A;0,010;20;0", False),
+        ("A;1,010;1000;0", False),
+        ("A;1,01;20;0", False),
+        ("A;1;20;0", False),
+    ],
+)
+def test_a_comma_that_may_part_thousands_is_named(rows: str, doubtful: bool, dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", "--plane", "A:20mm", stdin=ONE + rows + "\n")
+    assert done.stdout == dalembert("balance", "-", "--plane", "A:20mm", stdin=pointed(ONE + rows)).stdout
+    assert ("if the comma is between thousands" in done.stderr) == doubtful
+    if rows == "A;1,010;20;0":
+        assert "read '1,010' as 1.01, with a decimal comma; write 1010 if" in done.stderr
+
+
+@pytest.mark.parametrize("above", ["", "# fan 3\n"])
+@pytest.mark.parametrize("end", ["# end", "# read by Ann; Monday", "#end;;;", "  # end\n\n# and so on", "#"])
+def test_comments_below_the_header_are_left_out(above: str, end: str, dalembert: Dalembert) -> None:
+    rows = ["A;1,5;20;0", "#B;2;20;90", "#3;2,5;20;90"]
+    plain = dalembert("balance", "-", "--plane", "A:20mm", stdin=ONE + "\n".join(rows))
+    assert plain.returncode == 0
+    for at in (0, 1, len(rows)):
+        text = above + ONE + "\n".join([*rows[:at], end, *rows[at:]])
+        done = dalembert("balance", "-", "--plane", "A:20mm", stdin=text)
+        assert (done.returncode, done.stdout) == (0, plain.stdout), done.stderr
+
+
+def test_a_row_that_is_too_short_is_no_comment(dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", "--plane", "A:20mm", stdin=ONE + "#1;2\n")
+    assert done.returncode == 1
+    assert "row 1 (line 2): found 2 cells, expected 4" in done.stderr
+    done = dalembert("balance", "-", "--plane", "A:20mm", stdin=ONE + "# end\n")
+    assert "a header and no rows" in done.stderr
+
+
+def test_a_comment_below_a_long_table(dalembert: Dalembert) -> None:
+    text = "rotor,mass_g,radius_mm,angle_deg\n" + "".join(f"{k},1.5,20,30\n" for k in range(10_100))
+    done = dalembert("balance", "-", "--plane", "A:20mm", stdin=f"{text}# end\n")
+    assert (done.returncode, done.stdout.count("\n")) == (0, 10_101)

@@ -72,7 +72,7 @@ def test_a_rotor_without_a_trial_run_that_others_have(dalembert: Dalembert) -> N
         (table("0,1,1,0,,,", "0,2,1,0,,,", "1,1,2,0,A,1,0", "1,2,2,0,B,1,0"), "joined by ';'"),
         (table("0,1,1,x,,,", "1,1,2,0,A,1,0"), "expected a number"),
         (table("0,1,1,0,,,,maybe", "1,1,2,0,A,1,0,", head=HEAD + ",trial_kept"), "expected yes or no"),
-        ("run,sensor,amplitude_um,phase_deg\n0,1,1,0\n", "stored coefficients by --influence"),
+        ("run,sensor,amplitude_um,phase_deg\n0,1,1,0\n", "stored influence coefficients"),
         ("sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g\n1,1,0,A,1\n", "no column run"),
         (table(head=HEAD), "no rows"),
     ],

@@ -109,3 +109,16 @@ def test_a_clipped_recording_is_named(
     edge = np.arccos(min(level / 3.2, 1.0))
     first = 3.2 * 2 / np.pi * (np.pi / 2 - edge + np.sin(edge) * np.cos(edge))
     assert result["signal"][0]["amplitude"] == pytest.approx(first, rel=2e-3)
+
+
+@pytest.mark.parametrize(("drift", "warned"), [(0.0, False), (0.001, False), (0.2, True), (-0.2, True)])
+def test_a_level_that_drifts_is_named(drift: float, warned: bool, dalembert: Dalembert) -> None:
+    turns = (np.arange(2500) + 0.5) / 100
+    a = 4 * np.cos(2 * np.pi * turns + 1) + 3 + drift * turns
+    rows = [f"{turn / 10:.5f},{int(turn % 1 < 0.1)},{x:.9f},1" for turn, x in zip(turns, a, strict=True)]
+    done = dalembert("signal", "-", "--json", stdin="t_s,mark,A_um,B_um\n" + "\n".join(rows) + "\n")
+    result = json.loads(done.stdout)
+    named = [warning for warning in result["warnings"] if "drifts" in warning]
+    assert [("level of A" in warning, "0.064 um" in warning) for warning in named] == [(True, True)] * warned
+    # the warning states how far the amplitude may be off
+    assert abs(result["signal"][0]["amplitude"] - 4) <= abs(drift) / np.pi + 1e-8

@@ -278,7 +278,7 @@ def test_alpha_of_a_file_of_vectors(dalembert: Dalembert, tmp_path: Path) -> Non
         (f"{STATED}\n1,A,2,150,0.2,\n1,A,3,150,0.2,\n", None, ["one coefficient for sensor 1 and plane A"]),
         (f"{STATED}\n1,B,2,150,0.2,\n", "trial", ["plane A", "has no stored coefficient", "expected B"]),
         (None, "A: [1@2]\nALPHA: [[1@2, 1@3], [4@5]]\n", ["rows of different lengths"]),
-        (None, "ALPHA: [[1@2]]\n", ["no A", "its coefficients are for --influence"]),
+        (None, "ALPHA: [[1@2]]\n", ["no A", "it has influence coefficients alone"]),
         (None, "A: [1@2]\nALPHA: [[1-2]]\n", ["ALPHA", "found '1-2'", "amplitude@phase"]),
     ],
 )

@@ -119,3 +119,43 @@ def test_a_pipe_has_the_verdict_of_a_grade_beside_the_corrections(
     # the terminal's table and the document have it themselves
     assert "verdict" not in dalembert(*words, *grade, "--json").stderr
     assert "note:" not in dalembert(*words, *grade, "--text").stderr
+
+
+@pytest.mark.parametrize("bearings", [(), ("--bearings", "-100mm:500mm")])
+def test_what_rounding_leaves_of_a_residual_is_shown_as_nothing(
+    bearings: tuple[str, ...], dalembert: Dalembert
+) -> None:
+    options = (*PLANES, "--grade", "API", "--speed", "2960rpm", "--rotor-mass", "85kg", "--center-z", "150mm")
+    text = dalembert("balance", "-", *options, *bearings, "--text", stdin=ROTOR).stdout
+    rows = [line.split() for line in text.splitlines() if line.endswith(" within")]
+    assert [row[-2] for row in rows] == ["0", "0"]
+    rough = dalembert(
+        "balance", "-", *options, *bearings, "--round-mass", "0.1g", "--text", stdin=ROTOR
+    ).stdout
+    rows = [line.split() for line in rough.splitlines() if line.endswith(" within")]
+    assert all(float(row[-2]) > 0.01 for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "unit"),
+    [
+        ("trial_mass_g", "20", "g·mm"),
+        ("trial_mass_oz", "2", "oz·in"),
+        ("trial_mass_lb", "0.1", "oz·in"),
+        ("trial_unbalance_oz_in", "2", "oz·in"),
+        ("trial_unbalance_kg_mm", "2", "kg·mm"),
+    ],
+)
+def test_the_tolerance_is_in_units_like_those_of_the_trials(
+    column: str, value: str, unit: str, dalembert: Dalembert, tmp_path: Path
+) -> None:
+    text = f"run,sensor,amplitude_mil,phase_deg,trial_plane,{column},trial_angle_deg\n0,b,3.4,116,,,\n1,b,1.8,42,1,{value},0\n"
+    options = ["--grade", "API", "--speed", "3560rpm", "--rotor-mass", "180lb"]
+    if "mass" in column:
+        options += ["--radius", "5in"]
+    done = dalembert("field", "-", *options, "--text", "--report", "r.md", stdin=text)
+    assert done.returncode == 0, done.stderr
+    # 4 W/N oz·in, W half of the rotor or, with one plane, all of it
+    whole = 4 * 180 / 3560 * OZ_IN * {"g·mm": 1e6, "oz·in": 1 / OZ_IN, "kg·mm": 1e3}[unit]
+    assert f"U_per = {whole:.6g} {unit}, shared equally" in done.stdout
+    assert f"tolerance API: {whole:.6g} {unit}, shared equally" in (tmp_path / "r.md").read_text()

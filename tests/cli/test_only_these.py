@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cli.body import states
-from cli.body.rotation import Rotation, read_body
+from rigidbody3d.rotation_in_time import Rotation
+from rigidbody3d.turning_body import read_body
 
 RACKET = "inertia = [1, 2, 3]\nomega = [0.01, 1, 0.01]\n"
 ALL = ("omega", "attitude", "momentum", "energy")

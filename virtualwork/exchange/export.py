@@ -7,9 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dalembert.hints import nearest
-from dalembert.units import UNITS
-
 if TYPE_CHECKING:
     from virtualwork.mechanism import Mechanism
 
@@ -68,6 +65,9 @@ def export_mechanism(
     ['gravity is left out: the format has none']
     True
     """
+    from dalembert.hints import nearest
+    from dalembert.units import UNITS
+
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in FORMATS:

@@ -24,8 +24,8 @@ class Floats:
     """The functions of floats, for `Tape.on`; they raise where Python's do."""
 
     const, binade = staticmethod(float), staticmethod(binade)
-    sqrt, atan2 = staticmethod(math.sqrt), staticmethod(math.atan2)
-    sin, cos = staticmethod(math.sin), staticmethod(math.cos)
+    sqrt, sin, cos = staticmethod(math.sqrt), staticmethod(math.sin), staticmethod(math.cos)
+    atan2 = staticmethod(math.atan2)
 
     @staticmethod
     def select(test: float, positive: float, otherwise: float) -> float:

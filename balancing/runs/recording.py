@@ -1,4 +1,4 @@
-"""A recorded vibration once per turn: its columns, amplitude and phase of each sensor, the worked solution."""
+"""A recorded vibration once per turn: time, mark and sensors of a table, amplitude and phase of each sensor."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
-from cli.read.options import bad
-from dalembert.angles import degrees
+import numpy as np
+
+from balancing.synchronous import OncePerTurn, once_per_turn
 from dalembert.errors import DataError
+from dalembert.tables.sources import open_source
+from dalembert.tables.table import read
 from dalembert.units import AMPLITUDES, UNITS, amplitude_kind, find_unit
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
-    from balancing.synchronous import OncePerTurn
-    from dalembert.arithmetic.doubled import Doubled
-    from dalembert.results.columns import Table
-    from dalembert.results.way import Topic
-    from dalembert.tables.table import Table as ReadTable
+    from dalembert.tables.table import Table
 
 FINE = 1e-4
 """Phases that hold to this, rad, come without a warning."""
 STEADY = 0.02
 """Turns whose speeds have a larger standard deviation, relatively, come with a warning."""
+DRIFT = 0.01
+"""Drifts that may change an amplitude by a larger share come with a warning."""
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
 
@@ -46,20 +46,40 @@ class Recording:
         return self.vectors.second_run(self.exact())
 
 
-def read_recording(path: str, pulses: int) -> Recording:
+def read_recording(path: str, pulses: int = 1) -> Recording:
     """Read the time, a mark, perhaps a tacho, and the vibration of each sensor; compute the vibration once per turn.
+
+    Parameters
+    ----------
+    path : str
+        CSV or workbook with `t_*`, `mark` (or tacho, keyphasor, pulse, trigger) and a column for each sensor: `A_um`.
+    pulses : int
+        Pulses of the mark in one turn.
 
     Raises
     ------
     DataError
         A missing column, vibration in several units or in peak-to-peak values, no whole turn.
+    ValueError
+        Several pulses in a turn, and a mark beside a tacho, which count them.
+
+    Examples
+    --------
+    Ten turns at 20 ms of 30·cos(ωt + 60°) µm, with a mark that rises at the start of each:
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> t = np.arange(2000) / 10_000
+    >>> turns = 50 * t % 1
+    >>> samples = 30 * np.cos(2 * np.pi * turns + np.pi / 3)
+    >>> rows = zip(t.tolist(), (turns < 0.5).astype(int).tolist(), samples.tolist())
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder, "recording.csv")
+    ...     _ = table.write_text("t_s,mark,A_um\\n" + "\\n".join(f"{t},{m},{s}" for t, m, s in rows))
+    ...     recording = read_recording(str(table))
+    >>> recording.sensors, recording.unit, np.abs(recording.vectors.vector).round(1)
+    (['A'], 'um', array([30.]))
     """
-    import numpy as np
-
-    from balancing.synchronous import once_per_turn
-    from dalembert.tables.sources import open_source
-    from dalembert.tables.table import read
-
     # below lines of a title the header is the line with these
     expected = {"t": "time", "time": "time", **dict.fromkeys(MARKS, "number")}
     source = open_source(path, expected, ())
@@ -73,7 +93,7 @@ def read_recording(path: str, pulses: int) -> Recording:
     if len(others) > 1:
         raise DataError(f"{file}: the columns {', '.join(marks)}: expected a mark and one tacho")
     if others and pulses > 1:
-        raise bad("--pulses", f"{file} has a mark and a tacho: the pulses of a turn are counted")
+        raise ValueError(f"{file} has a mark and a tacho: the pulses of a turn are counted")
     time = "t" if any(name.lower().startswith("t_") for name in header) else "time"
     units = _vibration(file, header, (time, *marks))
     unit = next(iter(units.values()))
@@ -114,20 +134,44 @@ def read_recording(path: str, pulses: int) -> Recording:
                 f"{table.file}: {share:.0%} of the samples of {sensor} have its largest or smallest value: the recording is "
                 "clipped, and the amplitude too small; record with a larger range"
             )
+        k, shift = sensors.index(sensor), _drift(t.si, samples, result) / np.pi
+        # what scatters from turn to turn is in the uncertainty
+        if shift > max(DRIFT * abs(result.vector[k]), 3 * result.deviation[k]):
+            table.warnings.append(
+                f"{table.file}: the level of {sensor} drifts: the amplitude may be off by {shift:.2g} {unit} for it; record without the "
+                "offset (AC coupling, a high-pass filter)"
+            )
     exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
     return Recording(sensors, unit, result, table.warnings, exact)
+
+
+def _drift(t: NDArray[np.float64], samples: NDArray[np.float64], of: OncePerTurn) -> float:
+    """Return how far the level of a signal drifts in a turn, by the means of two equal numbers of turns; a ramp of this size adds
+    1/π of it to the first order.
+
+    >>> import numpy as np
+    >>> from balancing import once_per_turn
+    >>> t = np.arange(0, 1, 0.001)
+    >>> turns = once_per_turn(t, np.cos(40 * np.pi * t)[:, None], np.sin(40 * np.pi * t))
+    >>> round(_drift(t, np.cos(40 * np.pi * t) + 2 * t, turns), 3)
+    0.1
+    """
+    import numpy as np
+
+    half = of.turns // 2
+    if not half:
+        return 0.0
+    begin, middle, end = np.searchsorted(t, t[0] + 2 * np.pi / of.speed * half * np.arange(3))
+    return abs(float(samples[middle:end].mean() - samples[begin:middle].mean())) / half
 
 
 def _clipped(samples: NDArray[np.float64]) -> float:
     """Return the share of samples at the largest or the smallest value; 0 where a sine in steps as fine has a third as many.
 
-    >>> import numpy as np
     >>> sine = np.cos(np.arange(1000) / 9)
     >>> _clipped(sine), round(_clipped(np.clip(sine, -0.8, 1)), 2), _clipped(sine.round(1))
     (0.0, 0.21, 0.0)
     """
-    import numpy as np
-
     values, counts = np.unique(samples, return_counts=True)
     if len(values) < 3:
         return 0.0
@@ -178,11 +222,9 @@ def _vibration(file: str, header: list[str], others: tuple[str, ...]) -> dict[st
 
 
 def _exact(
-    table: ReadTable, names: tuple[str, str, str | None], sensors: list[str], pulses: int
+    table: Table, names: tuple[str, str, str | None], sensors: list[str], pulses: int
 ) -> tuple[Any, ...]:
     """The recording in 32 digits, as `OncePerTurn.second_run` takes it; `names` of time, mark and tacho."""
-    import numpy as np
-
     from dalembert.tables.exact import long_column
 
     t, mark, tacho = (None if name is None else table.numbers[name] for name in names)
@@ -191,57 +233,3 @@ def _exact(
     level, other = (None if column is None else long_column(column) for column in (mark, tacho))
     signals: Any = np.stack([long_column(table.numbers[name]) for name in sensors], axis=1)
     return long_column(t) * float(above) / float(below), signals, level, pulses, other
-
-
-def vectors(recording: Recording) -> Table:
-    """A row for each sensor."""
-    import numpy as np
-
-    from dalembert.results.columns import Column, Table, apart, names, number
-
-    of, unit = recording.vectors, recording.unit
-    rows = len(recording.sensors)
-
-    def column(name: str, values: NDArray[np.float64], exact: Callable[[], Doubled]) -> Column:
-        return Column(name, unit, values, apart(values, "number", "", exact), name, values)
-
-    return Table(
-        [
-            names("sensor", recording.sensors),
-            number("speed", "speed", [of.speed] * rows, "rpm", exact=lambda: recording.second.speed.doubled),
-            column("amplitude", np.abs(of.vector), lambda: recording.second.vector.size),
-            number("phase", "angle", degrees(of.vector), exact=lambda: recording.second.vector.degrees),
-            column("amplitude_uncertainty", of.deviation, lambda: recording.second.deviation.doubled),
-            names("turns", [of.turns] * rows),
-        ],
-        keys=("sensor",),
-        place="signal[]",
-        above="amplitude of a·cos(ωt + phase), t = 0 at the mark; the mean of single turns",
-        documented=[
-            number("phase_resolution", "angle", [float(np.degrees(of.phase_resolution))] * rows),
-            number("speed_sd", "speed", [of.speed_deviation] * rows),
-        ],
-    )
-
-
-def way(recording: Recording) -> list[Topic]:
-    """The worked solution: one topic."""
-
-    from dalembert.results.way import Topic, figures
-    from dalembert.units import written
-
-    of = recording.vectors
-    text = [
-        f"Turns between marks: {of.turns}; ω = 2π/T = {figures(float(of.speed))} rad/s.",
-        "In each turn a·cos(ωt + phase) is fitted: x = a·cos(phase) = (2/T)∫ s·cos ωt dt, y = a·sin(phase) = −(2/T)∫ s·sin ωt dt; "
-        "the vectors of all turns are averaged.",
-    ]
-    entries = []
-    for sensor, v in zip(recording.sensors, of.vector.tolist(), strict=True):
-        angle = degrees(v)
-        text.append(
-            f"  {sensor}: ({figures(v.real)}, {figures(v.imag)}) = {figures(abs(v))} ∠ {figures(angle)}° {written(recording.unit)}"
-        )
-        entries.append({"sensor": sensor, "x": v.real, "y": v.imag, "amplitude": abs(v), "phase_deg": angle})
-    head = {"turns": int(of.turns), "speed_rad_s": float(of.speed), "sensors": entries}
-    return [Topic("vectors", text, "Vectors once per turn", head)]

@@ -6,26 +6,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import (
-    Placement,
-    drill_depth,
-    fewest_from_stock,
-    place,
-    place_from_stock,
-    place_weights,
-    transfer,
-)
-from balancing.weights import ENOUGH
-from cli.read import options
+from balancing.placement import Placement, drill_depth, place, transfer
+from balancing.weights import ENOUGH, fewest_from_stock, place_from_stock, place_weights
 from dalembert.angles import degrees, in_turn, phasor
 from dalembert.errors import DataError, quote
-from dalembert.tables.files import SUFFIXES, read_bytes, remember, split_sheet
+from dalembert.tables.files import read_bytes, remember
 from dalembert.units import from_si, to_si
 
 Real = NDArray[np.float64]
@@ -111,30 +101,40 @@ class Correction(NamedTuple):
         return f"rotor {self.rotor}, plane {self.plane}"
 
 
-def read_corrections(words: list[str], rotor: str | None, plane: str | None) -> list[Correction]:
-    """Read MASS@ANGLE ..., or one file, with the rotor and the plane to choose from it."""
-    file = words[0]
-    if not _is_file(file):
-        options.refuse("chooses among the corrections of a file: expected a file", rotor=rotor, plane=plane)
-        return [Correction("1", "1", [read_vector(word) for word in words])]
-    if len(words) > 1:
-        raise options.bad("MASS@ANGLE", f"'{words[1]}': expected nothing in addition to a file")
-    corrections = _from_json(file) if file.lower().endswith(".json") else _from_table(file)
+def read_corrections(path: str, rotor: str | None = None, plane: str | None = None) -> list[Correction]:
+    """Read the corrections of a file that `dalembert field` wrote: its JSON, or a table with mass, angle, rotor, plane.
+
+    Parameters
+    ----------
+    path : str
+    rotor, plane : str, optional
+        Which of them alone; all of them where None.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read, or has no such correction.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder, "corrections.csv")
+    ...     _ = table.write_text("plane,mass_g,angle_deg\\nA,3,90\\nB,2,180\\n")
+    ...     (correction,) = read_corrections(str(table), plane="B")
+    >>> correction.name, correction.vectors[0]
+    ('rotor 1, plane B', Vector(mass=2.0, mass_unit='g', angle=180.0, angle_unit='deg'))
+    """
+    corrections = _from_json(path) if path.lower().endswith(".json") else _from_table(path)
     for noun, wanted, field in (("rotor", rotor, 0), ("plane", plane, 1)):
         if wanted is None:
             continue
         names = dict.fromkeys(str(each[field]) for each in corrections)
         corrections = [each for each in corrections if each[field] == wanted]
         if not corrections:
-            raise DataError(f"{file}: no {noun} {quote(wanted)}: expected one of {', '.join(names)}")
+            raise DataError(f"{path}: no {noun} {quote(wanted)}: expected one of {', '.join(names)}")
     return corrections
-
-
-def _is_file(text: str) -> bool:
-    """Whether an argument is a file, not a MASS@ANGLE."""
-    path, _ = split_sheet(text)
-    suffix = Path(path).suffix.lower() in (".csv", ".txt", ".json", *SUFFIXES)
-    return text == "-" or suffix or ("@" not in text and Path(path).is_file())
 
 
 def _from_table(path: str) -> list[Correction]:
@@ -194,12 +194,6 @@ def _vector(one: Mapping[str, str | float]) -> Vector:
     return Vector(mass, "kg", angle, "deg")
 
 
-def read_vector(spec: str) -> Vector:
-    """Read `83.5g@308.87deg`."""
-    expected = f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg"
-    return Vector(*options.mass_at("MASS@ANGLE", spec, spec, "mass", expected))
-
-
 @dataclass(frozen=True)
 class Share:
     """The correction of one plane, and the masses that make it."""
@@ -228,7 +222,23 @@ class Placed(NamedTuple):
 
 
 class Placing:
-    """A correction placed on request: a share for each plane, the masses, what to warn of."""
+    """A correction placed on request: a share for each plane, the masses, what to warn of.
+
+    Raises
+    ------
+    DataError
+        One place cannot bear the correction; the weights in stock do not do; too many holes.
+
+    Examples
+    --------
+    10 g at 45° on two places beside it, by the sine rule 7.07 g each:
+
+    >>> angles = [0.0, 90.0]
+    >>> request = Request(angles, None, None, None, 1, None, None, None, None, False, lambda: [])
+    >>> placing = Placing(Correction("1", "A", [Vector(10.0, "g", 45.0, "deg")]), request)
+    >>> [(each.angle, round(1000 * each.mass, 2)) for each in placing.masses]
+    [(0.0, 7.07), (90.0, 7.07)]
+    """
 
     def __init__(self, correction: Correction, request: Request) -> None:
         self.correction, self.request = correction, request

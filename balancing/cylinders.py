@@ -1,8 +1,7 @@
-"""From a table of cylinders to the orders of their forces, the counterweights and the balance shafts, in SI."""
+"""An engine of a table of cylinders: the orders of its forces, its counterweights and balance shafts, in SI."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,11 +17,10 @@ from balancing.engine import (
     shaft_unbalances,
     turning_force,
 )
-from cli.read import options
-from cli.read.rotor_options import Planes
+from balancing.planes import Planes
 from dalembert.angles import phasor
 from dalembert.arithmetic.shapes import as_array, in_32_digits
-from dalembert.errors import DataError, quote
+from dalembert.errors import DataError
 from dalembert.tables.table import Table, read
 from dalembert.units import find_unit
 
@@ -100,6 +98,25 @@ def read_cylinders(path: str) -> Cylinders:
     ------
     DataError
         A missing column, a doubled name, a rod no longer than the throw, masses that are all zero.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> head = "cylinder,crank_deg,z_mm,throw_mm,rod_mm,reciprocating_kg"
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder, "cylinders.csv")
+    ...     _ = table.write_text(f"{head}\\n1,0,0,40,140,0.5\\n2,180,90,40,140,0.5\\n")
+    ...     cylinders = read_cylinders(str(table))
+    >>> cylinders.pins, cylinders.bank, cylinders.unbalance_unit
+    ([[0], [1]], array([90., 90.]), 'kg_mm')
+
+    The first order of two opposite cranks leaves a couple, the second a force:
+
+    >>> engine = Engine(cylinders, 100.0, 2, None, None, [], cylinders.pins)
+    >>> force, couple = (np.hypot(*engine.reciprocating.coefficients(of)[:, 1].T) for of in (False, True))
+    >>> force.round(3), couple.round(3)
+    (array([  0.   , 116.712]), array([18.   ,  5.252]))
     """
     dimensions = {
         "crank": "angle",
@@ -149,28 +166,6 @@ def read_cylinders(path: str) -> Cylinders:
 def _degrees(table: Table, name: str) -> Real:
     angle = table.require(name, "angle")
     return angle.values if angle.unit == "deg" else np.degrees(angle.si)
-
-
-def read_shafts(texts: Sequence[str], highest: int) -> list[Shaft]:
-    """Read `ORDER:Z:with` or `ORDER:Z:against`."""
-    shafts: list[Shaft] = []
-    for text in texts:
-        parts = [part.strip() for part in text.split(":")]
-        if len(parts) != 3 or parts[2] not in ("with", "against") or options.whole(parts[0]) < 1:
-            raise options.bad(
-                "--shaft", f"'{text}': expected ORDER:Z:with or ORDER:Z:against, such as 2:150mm:against"
-            )
-        shaft = Shaft(
-            options.whole(parts[0]), options.needed("--shaft", parts[1], "length"), parts[2] == "against"
-        )
-        if shaft.order > highest:
-            raise options.bad(
-                "--shaft", f"'{text}': order {parts[0]} is above the highest: expected --order {parts[0]} too"
-            )
-        if any((s.order, s.z, s.against) == (shaft.order, shaft.z, shaft.against) for s in shafts):
-            raise options.bad("--shaft", f"'{text}': two shafts of one order and sense at one place")
-        shafts.append(shaft)
-    return shafts
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -268,16 +263,3 @@ class Engine:
     def balanced(self) -> bool:
         """Whether anything balances it."""
         return self.counterweights is not None or bool(self.shafts)
-
-    def idle(self, shaft: Shaft, unbalance: complex) -> str:
-        """Say why a shaft has nothing to balance; empty where it has."""
-        if unbalance:
-            return ""
-        couple = self.on_the_crank.turning(shaft.order, shaft.against, couple=True)
-        named = quote(f"{shaft.order}:{shaft.z:g}m:{'against' if shaft.against else 'with'}")
-        if couple:
-            return (
-                f"--shaft {named}: order {shaft.order} has a couple but no force in this sense: one shaft cannot balance it; "
-                "add a second one at another place"
-            )
-        return f"--shaft {named}: order {shaft.order} has no force in this sense: the shaft has nothing to balance"

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.cases.ledger import of_link
 from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_number
 from dalembert.tables.headers import spellings
@@ -42,11 +41,6 @@ class Cell(NamedTuple):
     occurrence: int
     quantity: str
     factor: float
-
-    @property
-    def symbol(self) -> str:
-        """How an equation calls the load."""
-        return of_link(LOADS[self.quantity].split("_")[0].replace("torque", "T"), self.link)
 
 
 @dataclass(frozen=True)
@@ -132,7 +126,36 @@ class StateTable:
 
 
 def read_states(path: str) -> StateTable:
-    """Read the states of links, one row per link, step and velocity field, and find the unknowns."""
+    """Read the states of links, one row per link, step and velocity field, and find the unknowns.
+
+    Parameters
+    ----------
+    path : str
+        CSV or workbook with the columns of `COLUMNS`, step, field and link; an unknown load is marked ? or ?NAME.
+
+    Returns
+    -------
+    StateTable
+        `values`, each column in SI; `steps`, the rows of each velocity field and the unknowns.
+
+    Raises
+    ------
+    DataError
+        The table cannot be read, has no unknown, or not as many in a step as velocity fields.
+
+    Examples
+    --------
+    A weight of 20 N on a link that sinks at 0.5 m/s, and the torque on another one that turns at 2 rad/s:
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder, "states.csv")
+    ...     _ = table.write_text("link,fy_N,vy_m_s,torque_N_m,omega_rad_s\\n1,,,?,2\\n2,-20,-0.5,,\\n")
+    ...     states = read_states(str(table))
+    >>> states.values["fy"], states.steps[0].unknowns[0].label
+    (array([  0., -20.]), '? (torque_N_m of link 1)')
+    """
     table = read(path, numbers=COLUMNS, texts=["step", "field", "link"], blank=list(COLUMNS), marker="?")
     table.needed("link")
     _no_displacements(table)

@@ -1,4 +1,4 @@
-"""A number as it is written: as it is shown, in SI, and exactly; each comes from the decimals, none from another."""
+"""Numbers and ranges as they are written: as they are shown, in SI, and exactly; each comes from the decimals, none from another."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from dalembert.units import UNITS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.read.options import Steps
     from dalembert.arithmetic.doubled import Doubled
 
     Reals = NDArray[np.float64]
@@ -57,6 +56,42 @@ class Written(NamedTuple):
 def written(row: NDArray[Any]) -> list[Written]:
     """Return the numbers of a row."""
     return [Written(*each) for each in row.tolist()]
+
+
+class Steps(NamedTuple):
+    """A range in equal steps: (first + i·each)/below for i from 0 to n − 1, each the nearest double.
+
+    >>> Steps(0, 1, 10, 4).at(np.arange(4))
+    array([0. , 0.1, 0.2, 0.3])
+    """
+
+    first: int
+    each: int
+    below: int
+    n: int
+
+    def at(self, i: NDArray[np.intp]) -> Reals:
+        """The values at some places."""
+        if self._fits:
+            # one rounding, that of the division
+            return np.asarray((self.first + i * self.each) / self.below)
+        return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
+
+    def exact(self, i: NDArray[np.intp]) -> Doubled:
+        """The values at some places in 32 digits."""
+        from fractions import Fraction
+
+        from dalembert.arithmetic.doubled import Doubled
+        from dalembert.arithmetic.doubled_operations import doubled_array
+
+        if self._fits:
+            return Doubled((self.first + i * self.each).astype(float)) / float(self.below)
+        return doubled_array([Fraction(self.first + k * self.each, self.below) for k in i.tolist()], i.shape)
+
+    @property
+    def _fits(self) -> bool:
+        """Whether doubles hold the whole numbers exactly."""
+        return max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below) < 2**53
 
 
 class Range(NamedTuple):

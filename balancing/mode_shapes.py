@@ -1,4 +1,4 @@
-"""Mode shapes from a table, for modal balancing."""
+"""Mode shapes at stations along the shaft, from a table: the sums that must vanish at masses and planes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import UnreachedMode, shapes_at
-from cli.read.options import bad
+from balancing.modal import UnreachedMode, shapes_at
 from dalembert.errors import DataError, quote
 from dalembert.tables.headers import Heading
 from dalembert.tables.sources import Source
@@ -89,14 +88,45 @@ class Modes:
         return f"the planes cannot balance {', '.join(left)} independently: expected planes at other places"
 
 
-def read_modes(path: str, count: int | None, rigid: bool) -> Modes:
-    """Read `z_*` and a column for each mode, or rows of `mode, z_*, shape`."""
+def read_modes(path: str, count: int | None = None, rigid: bool = False) -> Modes:
+    """Read mode shapes: `z_*` and a column for each mode, or rows of `mode, z_*, shape`.
+
+    Parameters
+    ----------
+    path : str
+        CSV or workbook.
+    count : int, optional
+        The number of modes, from the first on; all of them where it is None.
+    rigid : bool
+        Whether force and couple are to vanish too.
+
+    Raises
+    ------
+    DataError
+        A mode that stands twice at a station, has none there, or is zero; fewer than two stations.
+    ValueError
+        The table has fewer modes than `count`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder, "modes.csv")
+    ...     _ = table.write_text("z_mm,1,2\\n0,0,0\\n250,1,1\\n500,0,-1\\n")
+    ...     modes = read_modes(str(table), rigid=True)
+    >>> modes.conditions, modes.shapes
+    (['force', 'couple', 'mode 1', 'mode 2'], array([[ 0.,  1.,  0.],
+           [ 0.,  1., -1.]]))
+    >>> modes.at(np.array([0.25]), "a mass").round(3).ravel()
+    array([1., 0., 1., 1.])
+    """
     table = read(path, numbers={"z": "length", "shape": "number"}, texts=["mode"], layout=_by_mode)
     z, shape = table.require("z", "length").si, table.require("shape", "number").values
     names, code = table.numbered("mode", "1")
     if count is not None:
         if count > len(names):
-            raise bad("--mode-count", f"{count}: {table.file} has {len(names)} modes")
+            raise ValueError(f"{count}: {table.file} has {len(names)} modes")
         names = names[:count]
     stations = np.unique(z)
     shapes = np.full((len(names), len(stations)), np.nan)
