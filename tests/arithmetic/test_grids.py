@@ -51,6 +51,20 @@ def test_a_grid_is_all_its_lanes(shape):
         np.testing.assert_allclose(table.ravel(), lanes[name], rtol=4e-16, err_msg=name)
 
 
+@pytest.mark.parametrize("columns", [1, 2, 5, 31, 40])
+def test_a_row_has_the_same_bits_however_many_there_are(monkeypatch, columns):
+    monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
+    recorder = Recorder()
+    a, q, same = (recorder.input(name) for name in ("a", "q", "same"))
+    turned = RECORDED.sin(same) * RECORDED.atan2(a, same) + RECORDED.cos(q + RECORDED.sqrt(same))
+    tape = recorder.tape({"both": turned, "same": RECORDED.cos(same), "none": 1.0 / (same - abs(same))})
+    a, q = np.random.default_rng(1).normal(size=(5000, 1)), np.linspace(0.0, 3.0, columns)[None]
+    for number in np.random.default_rng(2).uniform(0.1, 50.0, 20):
+        whole = run_grid(tape, {"a": a, "q": q, "same": number}, (5000, columns))
+        few = run_grid(tape, {"a": a[:7], "q": q, "same": number}, (7, columns))
+        np.testing.assert_array_equal(np.array(few), np.array(whole)[:, :7])
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_inputs_that_hang_on_both_are_lanes_of_their_own(monkeypatch, engine):
     monkeypatch.setenv("DALEMBERT_ENGINE", engine)
@@ -62,7 +76,9 @@ def test_inputs_that_hang_on_both_are_lanes_of_their_own(monkeypatch, engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("shape", [(4, 3), (4, 1), (3, 8), (5, 45), (2, 20_001), (40, 360)])
+@pytest.mark.parametrize(
+    "shape", [(4, 3), (4, 1), (3, 8), (5, 45), (2, 20_001), (40, 360), (5000, 1), (3000, 2)]
+)
 def test_outputs_go_to_their_place_and_a_test_says_one_thing_of_a_row(monkeypatch, engine, shape):
     r, c = shape
     recorder = Recorder()
