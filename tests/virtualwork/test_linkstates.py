@@ -57,6 +57,7 @@ def exact_power(row: dict[str, Any], gravity: tuple[float, float]) -> tuple[Frac
     return sum(products, q(0)), sum(map(abs, products), q(0))
 
 
+@pytest.mark.slow
 @given(st.lists(link, min_size=1, max_size=5), pair)
 @settings(max_examples=200, deadline=None)
 def test_power_is_that_of_equation_5(links: list[dict[str, Any]], gravity: tuple[float, float]) -> None:

@@ -115,6 +115,7 @@ def test_a_pendulum_that_comes_by_its_upper_rest_again_and_again(short: float, s
     assert run.error_estimate.max() < 2e4 * np.finfo(float).eps / short**2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [3, pytest.param(1, marks=pytest.mark.slow), pytest.param(18, marks=pytest.mark.slow)]
 )
