@@ -34,41 +34,51 @@ HEAVY = (
     "matplotlib.figure",
     "matplotlib.projections.polar",
 )
+# the words of calls that load some of these; to fork from a process that holds them takes twice as long
+LOAD = {"body", "fit", "--find", "--flywheel", "--modes", "--plot", "--report"}
 
 
 class Forks:
-    """The process that forks, and the folder of the streams of a call."""
+    """The processes that fork, a light one and one that holds what is heavy, and the folder of the streams of a call."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.server = subprocess.Popen(
-            # -P: the folders of the tests are named as the packages are
-            [sys.executable, "-P", __file__],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"},
-            text=True,
-        )
+        self.servers: dict[tuple[str, ...], subprocess.Popen[str]] = {}
+
+    def server(self, held: tuple[str, ...]) -> subprocess.Popen[str]:
+        """Return the process that has imported the command, and what is named."""
+        if held not in self.servers:
+            self.servers[held] = subprocess.Popen(
+                # -P: the folders of the tests are named as the packages are
+                [sys.executable, "-P", __file__, *held],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"},
+                text=True,
+            )
+        return self.servers[held]
 
     def run(
         self, arguments: list[str], cwd: Path, env: dict[str, str], stdin: bytes
     ) -> tuple[int, bytes, bytes]:
         """Call `dalembert ARGUMENTS`; return its status and what it wrote on its two streams."""
-        assert self.server.stdin is not None
-        assert self.server.stdout is not None
+        server = self.server(() if LOAD.isdisjoint(arguments) else HEAVY)
+        assert server.stdin is not None
+        assert server.stdout is not None
         streams = [self.folder / name for name in ("in", "out", "err")]
         streams[0].write_bytes(stdin)
         request = {"arguments": arguments, "cwd": str(cwd), "env": env, "streams": [str(s) for s in streams]}
-        self.server.stdin.write(json.dumps(request) + "\n")
-        self.server.stdin.flush()
-        status = int(self.server.stdout.readline())
+        server.stdin.write(json.dumps(request) + "\n")
+        server.stdin.flush()
+        status = int(server.stdout.readline())
         if status == -signal.SIGALRM:
             raise subprocess.TimeoutExpired(["dalembert", *arguments], LONGEST)
         return status, streams[1].read_bytes(), streams[2].read_bytes()
 
     def close(self) -> None:
-        """End the process."""
-        self.server.communicate(timeout=30)
+        """End the processes."""
+        for server in self.servers.values():
+            server.communicate(timeout=30)
 
 
 def _become(request: dict[str, Any]) -> None:
@@ -112,8 +122,8 @@ def _call(request: dict[str, Any]) -> int:
 
 
 def serve() -> None:
-    """Import what commands import, then fork for each request."""
-    for name in HEAVY:
+    """Import what commands import, and what the command line names, then fork for each request."""
+    for name in sys.argv[1:]:
         import_module(name)
     for name in OWN:
         for module in walk_packages(import_module(name).__path__, f"{name}."):

@@ -7,9 +7,12 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
 from tests.test_boundaries import INSTALLED, ROOT
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_the_packages_and_the_examples(tmp_path: Path) -> None:
     subprocess.run(
         [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", tmp_path, ROOT],

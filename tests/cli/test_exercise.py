@@ -226,6 +226,7 @@ def test_a_mechanism_of_every_kind_has_a_figure(dalembert: Dalembert, tmp_path: 
     assert all(f">{name}</text>" in sheet for name in (*m.points, *m.links))
 
 
+@pytest.mark.slow
 def test_names_of_a_sheet_s_mechanism_stand_beside_the_lines(dalembert: Dalembert, tmp_path: Path) -> None:
     """Names of the Klann leg's links and points stood on its lines; a tall mechanism is not stretched to the page's width."""
     assert dalembert("examples", "exercise-klann").returncode == 0

@@ -98,6 +98,7 @@ def test_many_prefixes_are_declared_at_once() -> None:
         read("file", f"<robot><x:y {used}/></robot>".encode(), None)
 
 
+@pytest.mark.slow
 def test_frames_of_sdf_may_follow_one_another_without_end() -> None:
     """Each frame is 1 mm farther than the next one, and a joint stands in the first."""
     text = '<sdf version="1.9"><model name="m"><link name="crank"/>' + "".join(

@@ -119,6 +119,7 @@ def test_workers_write_one_file_of_parquet(dalembert, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["m.toml", "one.parquet", "two.parquet"]
 
 
+@pytest.mark.slow
 def test_json_of_several_workers_is_that_of_one(dalembert, table, tmp_path):
     call = ("mechanism", "m.toml", "--over", "0deg:720deg:6deg", "--json", "--cases")
     # 121 poses each: a part holds 33 of the variants

@@ -181,6 +181,7 @@ def test_variants_by_several_processes_give_the_same_bytes(
     assert parquet.ParquetFile(file).num_row_groups == 3
 
 
+@pytest.mark.slow
 def test_digits_of_variants_one_by_one_and_by_processes(dalembert: Dalembert, pendulum: Path) -> None:
     more = (
         "--time",

@@ -78,6 +78,7 @@ def test_a_block_is_a_row_group(dalembert: Dalembert, tmp_path: Path) -> None:
     assert file.schema_arrow.field("H_x_m").type == pyarrow.float64()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [files.parquet, lambda tables: files.workbook({"poses": tables})])
 def test_no_block_is_held_once_it_is_written(form: Callable[[Iterator[Table]], Iterator[bytes]]) -> None:
     made: list[weakref.ref[Table]] = []

@@ -201,6 +201,7 @@ def test_as_markdown_with_its_picture_beside(command: str, dalembert: Dalembert,
             assert len(re.findall(r"(?<!\\)\|", above)) == len(re.findall(r"(?<!\\)\|", line))
 
 
+@pytest.mark.slow
 def test_no_table_is_wider_than_the_page(dalembert: Dalembert, tmp_path: Path) -> None:
     for command in ("mechanism", "spin"):
         made(dalembert, command, "--report", "r.html", "-o", "out.csv")

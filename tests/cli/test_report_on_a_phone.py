@@ -44,6 +44,7 @@ def report(dalembert: Dalembert, tmp_path: Path, call: str) -> Path:
     return tmp_path / "report.html"
 
 
+@pytest.mark.slow
 def test_every_table_scrolls_by_itself(dalembert: Dalembert, tmp_path: Path) -> None:
     text = report(dalembert, tmp_path, "forces").read_text()
     assert text.count("<table>") == text.count('<div class="wide"><table>') > 0

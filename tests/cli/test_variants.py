@@ -110,6 +110,7 @@ def test_a_variant_that_cannot_be_assembled_is_a_row_that_says_so(dalembert, fil
     assert len(rows(none.stdout)) == 2
 
 
+@pytest.mark.slow
 def test_a_variant_that_newton_cannot_put_together_is_a_row_too(dalembert, tmp_path):
     dalembert("examples", "stephenson-six-bar")
     # the five-bar of 75 + 80 + 70 mm spans a ground of 100 mm, not one of 1000 mm

@@ -136,6 +136,7 @@ def test_many_rotors_and_planes(dalembert: Any, tmp_path: Path) -> None:
             check(topics, rotor)
 
 
+@pytest.mark.slow
 def test_the_polygons_are_in_the_picture_and_in_the_report(dalembert: Any, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "r.csv").write_text(RIUL)

@@ -50,6 +50,7 @@ def test_a_tensor_in_oblique_axes_and_a_force_that_follows_the_spin() -> None:
     np.testing.assert_allclose(clocked.momentum, H + np.outer(t**2, [0, 0, 1]), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["body", "space"])
 def test_the_estimate_of_a_disk_that_spins_up_from_rest(frame: str) -> None:
     # θ = M t²/(2 I): 85 turns, of which the last take the shortest steps

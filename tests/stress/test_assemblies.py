@@ -48,6 +48,7 @@ def test_a_limit_on_one_side_alone() -> None:
     assert t.mechanism.check.input_limits[1] == np.inf
 
 
+@pytest.mark.slow
 def test_limits_are_where_a_scan_can_go_no_further() -> None:
     assert _limits(range(18)) > 2
 

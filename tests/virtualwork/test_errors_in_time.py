@@ -277,6 +277,7 @@ def test_where_a_first_solution_goes_another_way(
     assert (np.array(off_by) <= run.error_estimate[:, 0]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", ["A", "B", "ABCD", ""])
 def test_a_jump_of_friction_takes_digits_at_its_own_time_alone(joints: str) -> None:
     """Where a pin turns back accelerations and joint forces jump; afterwards they have their digits again, at rest too."""

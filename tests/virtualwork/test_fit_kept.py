@@ -113,6 +113,7 @@ def test_a_bound_that_does_not_press_changes_nothing() -> None:
     assert kept.extreme == pytest.approx(least_transmission(0.35, 0.9, 0.7), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_bound_that_presses_is_met_to_rounding() -> None:
     """Above 50° the least transmission is 50°, and another solver finds no better four-bar."""
     from scipy.optimize import minimize

@@ -39,6 +39,7 @@ def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.
     assert count == 2
 
 
+@pytest.mark.slow
 def test_a_long_chain_has_joint_forces() -> None:
     """Sixty four-bars in a row: each passes on what the next ones bear on it, however deep that goes."""
     ground = {"A": 0j} | {f"D{i}": 0.1 * (i + 1) + 0j for i in range(60)}

@@ -176,6 +176,7 @@ def test_through_flat_poses_as_the_energy_alone_has_it(
     assert np.abs(longer.energy_drift).max() < 10 * accuracy
 
 
+@pytest.mark.slow
 def test_energy_lost_between_interpolated_poses_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A kite through its flat pose, its rates from poses too far off, the same in both ways: no numbers, a time."""
     monkeypatch.setattr("virtualwork.intime.crossing.NARROWINGS", 1)

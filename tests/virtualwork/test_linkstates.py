@@ -58,7 +58,7 @@ def exact_power(row: dict[str, Any], gravity: tuple[float, float]) -> tuple[Frac
 
 
 @given(st.lists(link, min_size=1, max_size=5), pair)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_power_is_that_of_equation_5(links: list[dict[str, Any]], gravity: tuple[float, float]) -> None:
     exact = [exact_power(row, gravity) for row in links]
     total, size = sum(e[0] for e in exact), sum(e[1] for e in exact)

@@ -178,6 +178,7 @@ def of_seeds(seeds: range) -> list[Pair]:
     return every
 
 
+@pytest.mark.slow
 def test_any_topology() -> None:
     judge(of_seeds(range(8)))
 

@@ -115,9 +115,8 @@ def test_a_pendulum_that_comes_by_its_upper_rest_again_and_again(short: float, s
     assert run.error_estimate.max() < 2e4 * np.finfo(float).eps / short**2
 
 
-@pytest.mark.parametrize(
-    "seed", [3, pytest.param(1, marks=pytest.mark.slow), pytest.param(18, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 1, 18])
 def test_rounding_grows_through_changes_of_coordinates(seed: int) -> None:
     """A five-bar that passes dead points of its inputs, started at other times: only rounding differs, and the estimates cover it."""
     m = released._linkage(np.random.default_rng(seed), "five-bar")

@@ -110,6 +110,7 @@ def derivatives(m, angle, path):
     return np.concatenate([*found, motion.sensitivity("effort", path)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_any_mechanism_against_its_neighbours(kind, random_mechanism):
     """Groups without a closed form too (the triad)."""

@@ -136,6 +136,7 @@ def test_with_several_inputs_too():
     assert np.isnan(motion.link("bar").omega).all()
 
 
+@pytest.mark.slow
 def test_the_command_names_it(dalembert, tmp_path):
     a = math.radians(17)
     text = f"""

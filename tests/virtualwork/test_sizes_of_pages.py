@@ -173,6 +173,7 @@ def test_the_simplest_profile(tmp_path: Path) -> None:
     assert apart([example("cam-valve/cam-valve")], np.random.default_rng(1), 3, tmp_path) < 1e-14
 
 
+@pytest.mark.slow
 @needs_node
 def test_profiles_of_every_kind(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)

@@ -267,6 +267,7 @@ def test_of_several_inputs_a_group_drives_another_one():
         assert np.abs(places[i] - alone.point("M").position).max() <= known
 
 
+@pytest.mark.slow
 def test_refusals_and_limits_are_those_of_each_variant_alone():
     m, q = stephenson(), np.arange(0.0, 6.3, 0.5)
     # a rod with which the crank turns round, one with which it does not, one that is too short at the guess

@@ -53,6 +53,7 @@ def test_a_rod_that_swings_past_its_pin_turns_a_gear(past: float, inputs: int) -
     assert abs(np.exp(1j * alone[0]) - stood[-1]) < 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("past", PAST)
 def test_a_rod_that_swings_past_its_pin_winds_a_torsion_spring(past: float) -> None:
     q = np.array([-6.0, -1.0, 2.0, 3.0, 4.0, 12.0, 1300.0])
