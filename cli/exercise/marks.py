@@ -145,10 +145,9 @@ def _question(exercise: Exercise, table: ReadTable, row: int, columns: Mapping[s
     if not fitting:
         (key, cell), *_ = cells.items()
         expected = "; ".join(_where(exercise.asks[k]) for k in there)
-        found = ", ".join(f"{key} {quote(cell)}" for key, cell in cells.items())
-        raise table.error(
-            row, exercise.keys[key], cell, f"a row that is asked for ({expected}); found {found}"
-        )
+        row_of = ", ".join(f"{key} {quote(cell)}" for key, cell in cells.items())
+        more = f"; found {row_of}" if len(cells) > 1 else ""
+        raise table.error(row, exercise.keys[key], cell, f"a row of the questions ({expected}){more}")
     missing = [header for header in exercise.keys.values() if header not in columns]
     raise DataError(
         f"{table.file}: no column {', '.join(missing)}: expected {'it' if len(missing) == 1 else 'them'}, as "

@@ -12,6 +12,7 @@ from cli.exercise.solving import DataTable, Workshop, cell_of
 from cli.exercise.variants import Variant
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
+from dalembert.hints import nearest
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.report import html_part, report, spelled
 from dalembert.results.text import csv_text
@@ -95,6 +96,7 @@ def filled(workshop: Workshop, drawn: Mapping[str, Value], form: Callable[[str],
         raise DataError(
             f"{exercise.file}: key text: found {quote('{' + name + '}')}, expected a name of [draw], a dimension of the "
             "mechanism or a table's cell such as {rotor.csv:W1.mass_kg} that holds a number"
+            + nearest(name, workshop.dimensions)
         )
 
     return re.sub(r"\{([^{}\n]+)\}", put, exercise.text)

@@ -99,6 +99,20 @@ def test_a_bad_exercise_is_one_line_and_writes_nothing(
     assert {path.name for path in folder.iterdir()} == {"rotor.csv", "e.toml"}
 
 
+def test_a_dimension_in_the_text_that_is_none_is_answered_by_the_nearest(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    """It was answered by three kinds of names, and no name."""
+    assert dalembert("examples", "exercise-klann").returncode == 0
+    file = tmp_path / "exercise-klann.toml"
+    file.write_text(file.read_text().replace("{links.crank.B.x}", "{links.crnak.B.x}"))
+    done = dalembert("exercise", "exercise-klann.toml", "-o", "out")
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "'{links.crnak.B.x}'" in done.stderr
+    assert done.stderr.endswith("; did you mean 'links.crank.B.x'?\n")
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     "option",
     [

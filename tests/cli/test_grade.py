@@ -214,7 +214,7 @@ def test_names_are_kept_and_decimal_commas_read(dalembert: Dalembert, rotor: Pat
         ("student,plane,quantity\n1,B,mass_kg\n", ["no column answer"]),
         ("student,plane,quantity,answer\n9,B,mass_kg,1\n", ["row 1", "'9'", "a student of the key"]),
         ("student,plane,quantity,answer\n1,B,mass,1\n", ["row 1", "'mass'", "mass_kg, angle_deg"]),
-        ("student,plane,quantity,answer\n1,C,mass_kg,1\n", ["row 1", "'C'"]),
+        ("student,plane,quantity,answer\n1,C,mass_kg,1\n", ["row 1", "column plane: found 'C', expected a row of the questions (plane B; plane A)\n"]),
         ("student,plane,quantity,answer\n1,B,mass_kg,1\n1,B,mass_kg,2\n", ["row 2", "once"]),
         ("student,quantity,answer\n1,mass_kg,1\n", ["no column plane"]),
     ],
