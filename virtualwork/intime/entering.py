@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,9 @@ import numpy as np
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.cams import CamDrive
+from virtualwork.describe.laws import TURN
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.group_loops import unknowns
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.loaded_pose import Setting
@@ -171,6 +174,10 @@ def _one(x: Any) -> float:
 # --- loads given by tables ------------------------------------------------------------------------------------------
 # of a table's span: how far beyond its ends it is read, for a step may reach there by its rounding
 EDGE = 1e-12
+# of a turn, or of the size: what a step passes at most where it does not meet kinks
+PACES = 36
+# rad: how far a cam is from the end of a segment when it has left it, for its acceleration may have a step there
+LEAVES = 1e-5
 
 
 def place(load: Tabled, plan: Plan) -> tuple[Value, Rate] | None:
@@ -182,15 +189,22 @@ def place(load: Tabled, plan: Plan) -> tuple[Value, Rate] | None:
     angle = plan.angles[load.body]
     if not angle.by_inputs:
         return None
-    const, terms = angle.const, angle.inputs
     if load.axis == "angle":
-        return (
-            lambda t, q, v: const + sum(c * q[j] for j, c in terms),
-            lambda t, q, v, a: sum(c * v[j] for j, c in terms),
-        )
+        return angle_of(plan, load.body)
+    terms = angle.inputs
     return (
         lambda t, q, v: sum(c * v[j] for j, c in terms),
         lambda t, q, v, a: sum(c * a[j] for j, c in terms),
+    )
+
+
+def angle_of(plan: Plan, body: str, on: str = GROUND) -> tuple[Value, Rate]:
+    """The angle of a body against another and its derivative; inputs turn both."""
+    a, b = plan.angles[body], plan.angles[on]
+    const, terms = a.const - b.const, (*a.inputs, *((j, -c) for j, c in b.inputs))
+    return (
+        lambda t, q, v: const + sum(c * q[j] for j, c in terms),
+        lambda t, q, v, a: sum(c * v[j] for j, c in terms),
     )
 
 
@@ -216,14 +230,49 @@ def reader(load: Tabled, at: Value, *, imaginary: bool) -> Value:
     return value
 
 
+def every_kink(loads: Sequence[Tabled], drives: Sequence[CamDrive], plan: Plan) -> list[Watch | None]:
+    """The kinks of each table that is not over the time, and of each cam; None where they depend on more than the inputs."""
+    tables = [kinks(load, plan, f"table {n}") for n, load in enumerate(loads) if load.axis != "time"]
+    return [*tables, *(ends_of_law(drive, plan, f"cam {n}") for n, drive in enumerate(drives))]
+
+
 def kinks(load: Tabled, plan: Plan, name: str) -> Watch | None:
-    """The rows of a table, that no step may pass; None of a table over the time, or over what depends on more."""
+    """The rows of a table, that no step may pass; None of a table over what depends on more than the inputs."""
     of = place(load, plan)
-    if of is None or load.axis == "time":
+    if of is None:
         return None
     rows = [x for x, _ in load.table]
     period = rows[-1] - rows[0] if load.periodic else None
     return Watch(name, *of, rows[:-1] if period else rows, period, linear=True)
+
+
+def ends_of_law(drive: CamDrive, plan: Plan, name: str) -> Watch | None:
+    """The ends of the segments of a cam's law, or the rows of its table, that no step may pass.
+
+    Over a dwell steps grow, and would pass a short rise as a whole. None of a cam that more than inputs turn.
+    """
+    if not (plan.angles[drive.cam.cam].by_inputs and plan.angles[drive.on].by_inputs):
+        return None
+    value, rate = angle_of(plan, drive.cam.cam, drive.on)
+    rows = [drive.lift.first + x for x in drive.lift.knots[:-1]]
+    return Watch(name, value, rate, rows, TURN, linear=True, noise=LEAVES)
+
+
+def paces(scale: Floats) -> list[Watch]:
+    """Places of every input that no step may pass, where kinks cannot be met: no step is longer than from one to the next."""
+    each = [size / PACES if size != 1.0 else TURN / PACES for size in scale]
+    return [
+        Watch(
+            f"pace {j}",
+            lambda t, q, v, j=j: q[j],
+            lambda t, q, v, a, j=j: v[j],
+            [0.0],
+            pace,
+            linear=True,
+            noise=LEAVES,
+        )
+        for j, pace in enumerate(each)
+    ]
 
 
 def ends(load: Tabled, plan: Plan, t: float, q: Floats, v: Floats) -> str:

@@ -34,7 +34,7 @@ from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import Recording
 from virtualwork.intime.crossing import OTHER, Crossing, crossings, narrowed, nearest
-from virtualwork.intime.entering import Placed, ends, kinks, place, reader
+from virtualwork.intime.entering import Placed, ends, every_kink, paces, place, reader
 from virtualwork.intime.powers import motion_of, state_names
 from virtualwork.intime.watch import Floats, Value, Watch
 
@@ -174,11 +174,14 @@ class Equations:
             result = np.stack(poses.taped([Effort(j) for j in range(k)]), axis=1)
         return (result[1:] - result[0]).T, result[0]
 
+    @cached_property
+    def kinks(self) -> list[Watch | None]:
+        """The kinks of tables and of cams' laws; None where they depend on more than the inputs, so that steps pass them."""
+        return every_kink(self._tables, self.mechanism.cam_drives, self.assembly.plan)
+
     def watches(self) -> list[Watch]:
-        """What a step must not pass: the kinks of tables over what depends on the inputs alone."""
-        plan = self.assembly.plan
-        result = (kinks(load, plan, f"table {number}") for number, load in enumerate(self._tables))
-        return [watch for watch in result if watch is not None]
+        """What a step must not pass: kinks, and where those cannot be met too long a way."""
+        return [*filter(None, self.kinks), *(paces(self.scale) if None in self.kinks else ())]
 
     @cached_property
     def stops(self) -> list[float]:

@@ -276,8 +276,10 @@ def _simulated(
     equations = own.equations
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
-    levels = levels_of(m.inputs, until)
-    tolerance, end = first_tolerance(accuracy, equations.crosses), float(t[-1])
+    levels, end = levels_of(m.inputs, until), float(t[-1])
+    # where steps pass kinks the second solution has steps of its own, at a lower tolerance
+    lowest = LEAST * (GAIN + 1) if None in equations.kinks else LEAST
+    tolerance = max(lowest, first_tolerance(accuracy, equations.crosses))
     start, solutions = (float(t[0]), q, v), count(1)
 
     def reports() -> Callable[[float], None] | None:
@@ -290,23 +292,22 @@ def _simulated(
         # what is stiff somewhere is from the beginning
         fine = travel(own, start, end, tolerance, levels, Radau(), accuracy, progress=reports())
     for tries in range(TRIES):
-        coarse, method = fine, fine.legs[0].method
+        coarse, like, method = fine, fine if lowest == LEAST else None, fine.legs[0].method
         # near change points every solution is interpolated from other poses
         ways = own if tries % 2 else own.otherwise()
         # no farther than both go
         last = coarse.end if coarse.ended == UNDECIDED else end
-        # no tolerance lies below rounding
         finer = max(LEAST, tolerance / (GAIN + 1))
-        fine = travel(ways, start, last, finer, levels, method, accuracy, coarse, reports())
+        fine = travel(ways, start, last, finer, levels, method, accuracy, like, reports())
         fine.coarse = coarse
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
-        part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(coarse.followed)
+        part = 1.0 if equations.crosses or coarse.rough or fine.rough else share(coarse.followed)
         times = reached(t, fine.end)
         error = input_error(fine, coarse, times, part)
         worst = float((error / scale).max())
-        if worst <= accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
+        if worst <= accuracy or tolerance <= lowest or finer < lowest or fine.steps > MOST / 2:
             break
         least = float((unavoidable(fine, fine.nodes) / scale).max())
         if worst <= 2 * least and least <= UNKNOWN:
@@ -442,8 +443,7 @@ def _warnings(
         )
     elif worst > accuracy:
         warnings.append(f"accuracy {accuracy:g} is beyond rounding here: the estimated error is {worst:.1e}")
-    drives = run.assembly.mechanism.cam_drives
-    if drives:
+    if drives := run.assembly.mechanism.cam_drives:
         from virtualwork.intime.contacts import contacts_lost
 
         warnings += contacts_lost(run.fine, drives)

@@ -63,9 +63,9 @@ class Travel:
         return any(leg.ended == "stiff" for leg in self.legs)
 
     @property
-    def folds(self) -> bool:
-        """Whether a loop came near folding on the way: there halves of steps gain less than the method's order."""
-        return any(leg.ended == "folding" for leg in self.legs)
+    def rough(self) -> bool:
+        """Whether halves of steps gain less than the method's order: near a fold of a loop, or where steps pass kinks."""
+        return any(leg.ended == "folding" or None in leg.equations.kinks for leg in self.legs)
 
     @property
     def undecided(self) -> float | None:

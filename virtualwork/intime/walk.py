@@ -175,15 +175,25 @@ class Walk:
         except UNDONE:
             # of the rates, or of their tape
             return None, SHRINK
-        error = method.size(done, allowed(self.tolerance, scale, q, self.fastest, v, done.dv))
-        wanted = SAFETY * error ** (-1.0 / method.order) if error else GROW
-        if not error < most:
+
+        def judged(step: Step) -> tuple[bool, float]:
+            error = method.size(step, allowed(self.tolerance, scale, q, self.fastest, v, step.dv))
+            return error < most, SAFETY * error ** (-1.0 / method.order) if error else GROW
+
+        holds, wanted = judged(done)
+        if not holds:
             return None, wanted
         try:
-            return (done, self._met(h, done) if self.watches else None), wanted
+            met = self._met(h, done) if self.watches else None
         except UNDONE:
             # within the step it cannot be assembled
             return None, SHRINK
+        if met is not None and met.done is not None:
+            # the whole step may have passed unseen what one that ends at a kink sees
+            holds, shorter = judged(met.done)
+            if not holds:
+                return None, shorter * met.h / h
+        return (done, met), wanted
 
     # --- by compiled code -----------------------------------------------------------------------------------------
     def _marches(self) -> None:
