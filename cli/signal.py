@@ -146,11 +146,11 @@ def read_recording(path: str, pulses: int) -> Recording:
                 f"{table.file}: {share:.0%} of the samples of {sensor} have its largest or smallest value: the recording is "
                 "clipped, and the amplitude too small; record with a larger range"
             )
-        k, error = sensors.index(sensor), _drift(t.si, samples, result) / np.pi
+        k, change = sensors.index(sensor), _drift(t.si, samples, result) / np.pi
         # what scatters from turn to turn is in the uncertainty
-        if error > max(DRIFT * abs(result.vector[k]), 3 * result.deviation[k]):
+        if change > max(DRIFT * abs(result.vector[k]), 3 * result.deviation[k]):
             table.warnings.append(
-                f"{table.file}: the level of {sensor} drifts: the amplitude may be off by {error:.2g} {unit} for it; record without the "
+                f"{table.file}: the level of {sensor} drifts: the amplitude may be off by {change:.2g} {unit} for it; record without the "
                 "offset (AC coupling, a high-pass filter)"
             )
     exact = partial(_exact, table, (time, mark, tacho), list(units), pulses)
