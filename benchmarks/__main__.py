@@ -17,10 +17,10 @@ from benchmarks.speed import DOMAINS
 from cli.read.options import quantity
 from cli.show.commands import ShowOptions
 from cli.show.output import command
-from cli.show.result import Result
 from dalembert.errors import DataError, one_line
 from dalembert.hints import nearest
 from dalembert.results.columns import Column, Table
+from dalembert.results.result import Result
 
 if TYPE_CHECKING:
     from benchmarks.speed.measure import Measurement

@@ -9,15 +9,15 @@ GROUPS = {
     "Rotors": {
         "balance": ("cli.balance.run", "Balance rotors from a table of known eccentric masses."),
         "field": ("cli.field.run", "Balance rotors from measured vibration and trial masses."),
-        "trial": ("cli.trial.run", "Suggest a trial mass for the first run in the field."),
-        "signal": ("cli.signal.run", "Compute amplitude and phase of a recorded vibration."),
+        "trial": ("cli.rotor.trial", "Suggest a trial mass for the first run in the field."),
+        "signal": ("cli.rotor.signal", "Compute amplitude and phase of a recorded vibration."),
         "place": (
-            "cli.place.run",
+            "cli.rotor.place",
             "Put a correction where masses can go: holes, blades, weights in stock.",
         ),
-        "index": ("cli.index.run", "Separate a rotor's unbalance from its mandrel's: index balancing."),
-        "engine": ("cli.engine.run", "Compute the shaking forces and couples of an engine."),
-        "flywheel": ("cli.flywheel.run", "Size the flywheel of a shaft from a table of its torque."),
+        "index": ("cli.rotor.index", "Separate a rotor's unbalance from its mandrel's: index balancing."),
+        "engine": ("cli.rotor.engine", "Compute the shaking forces and couples of an engine."),
+        "flywheel": ("cli.rotor.flywheel", "Size the flywheel of a shaft from a table of its torque."),
     },
     "Mechanisms": {
         "mechanism": ("cli.mechanism.mechanism", "Solve the poses: positions, velocities, accelerations."),
@@ -36,21 +36,24 @@ GROUPS = {
         "simulate": ("cli.mechanism.simulate", "Simulate the motion in time under the loads."),
         "tolerance": ("cli.mechanism.tolerance", "Compute the effect of the tolerances of dimensions."),
         "fit": ("cli.mechanism.fit", "Fit dimensions to a target."),
-        "work": ("cli.work.run", "Find the load that balances a table of link states, by virtual work."),
+        "work": (
+            "cli.mechanism.work",
+            "Find the load that balances a table of link states, by virtual work.",
+        ),
     },
     "Bodies": {
-        "body": ("cli.body.run", "Compute inertia, angular momentum and shaft reactions of a body."),
+        "body": ("cli.body.body", "Compute inertia, angular momentum and shaft reactions of a body."),
         "spin": (
-            "cli.spin.run",
+            "cli.body.spin",
             "Compute the rotation of a body in time: free, under gravity, under a torque.",
         ),
     },
     "Teaching": {
         "exercise": (
-            "cli.exercise.run",
+            "cli.exercise.exercise",
             "Make the variants of an exercise: sheets, key, solutions, questions.",
         ),
-        "grade": ("cli.grade.run", "Mark the answers to an exercise, and name likely mistakes."),
+        "grade": ("cli.exercise.grade", "Mark the answers to an exercise, and name likely mistakes."),
     },
     "Files": {
         "import": ("cli.formats.run", "Import a mechanism drawn in another program."),

@@ -23,16 +23,16 @@ Rotors (`balancing`):
 
 Mechanisms (`virtualwork`):
     AssemblyError, Belt, Bound, Cam, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
-    Gear, Guess, Guide, Input, Link, LinkStates, Mechanism, MechanismError, MobilityError, Motion,
+    Gear, Guess, Guide, ImportedMechanism, Input, Link, LinkStates, Mechanism, MechanismError, MobilityError, Motion,
     Motor, Polar, Rack, Segment, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
-    counterweights, crank_rod_piston, direction_angle, grashof_class, newton, on_incline,
+    counterweights, crank_rod_piston, direction_angle, export_mechanism, grashof_class, import_mechanisms, newton, on_incline,
     on_moving_ramp, rotation_of_point, second_point, work_ledger
 
 Bodies (`rigidbody3d`):
-    Body, BodyMotion, FreeBody, FreeState, SHAPES, Shaft, Top, TopState, Trajectory, Wrench,
-    check_inertia, compose_body, from_scipy, gyroscopic_couple, inertia_of, inertia_tensor,
-    integrate_rotation, load_mesh, measure_of, mesh_properties, parallel_axis_shift, principal_axes,
-    products_of_inertia, read_parts, rolling_cones, sleeping_threshold, steady_precession, strike_body, to_scipy
+    Body, BodyMotion, FreeBody, FreeState, Robot, SHAPES, Shaft, Top, TopState, Trajectory, Wrench,
+    check_inertia, check_robot_inertias, compose_body, from_scipy, gyroscopic_couple, inertia_of, inertia_tensor,
+    integrate_rotation, link_body, load_mesh, measure_of, mesh_properties, parallel_axis_shift, principal_axes,
+    products_of_inertia, read_parts, read_robot, rolling_cones, sleeping_threshold, steady_precession, strike_body, to_scipy
 """
 
 from __future__ import annotations

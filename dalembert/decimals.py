@@ -22,7 +22,6 @@ Scaled = TypeVar("Scaled", float, complex, "NDArray[np.float64]", "NDArray[np.co
 FIGURES = 15  # decimals of so many figures are all told apart by their floats
 PLACES = 22  # the largest power of ten that is a float
 WHOLE = 2.0**53  # whole numbers up to it are floats
-ROUNDINGS = 4.0  # so many units of the last place a few products, quotients and sums move a number at most
 
 
 def decimal_to_si(number: str, factor: Factor) -> float:
@@ -108,36 +107,12 @@ def shown(value: Scaled, above: float, below: float) -> Scaled:
     import numpy as np
 
     parts, stored = (np.ascontiguousarray(np.atleast_1d(x)).view(float) for x in (result, value * 1.0))
-    near = _rounded(parts, 8)
-    shortest = np.where(times(near, above, below) == stored, near, parts)
-    shortest = shortest.view(np.asarray(result).dtype).reshape(np.shape(result))
-    return shortest if shortest.ndim else shortest.item()  # type: ignore[return-value]
-
-
-def short(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return computed numbers; one that is a decimal of at most 9 figures but for a few roundings comes out as that decimal.
-
-    Among the floats about one in a million lies so near to such a decimal without being meant as one.
-
-    >>> import numpy as np
-    >>> 1e-6 / 0.02 * 1e3, short(np.array([1e-6 / 0.02 * 1e3, 1 / 3, 0.0, -0.1 - 0.2, np.nan])).tolist()
-    (0.049999999999999996, [0.05, 0.3333333333333333, 0.0, -0.3, nan])
-    """
-    import numpy as np
-
-    near = _rounded(values, 9)
-    return np.where(np.abs(near - values) <= ROUNDINGS * np.spacing(np.abs(values)), near, values)
-
-
-def _rounded(values: NDArray[np.float64], figures: int) -> NDArray[np.float64]:
-    """Numbers rounded to so many figures; NaN where they are beyond the powers of ten that are floats."""
-    import numpy as np
-
     with np.errstate(all="ignore"):
-        places = figures - 1.0 - np.floor(np.log10(np.abs(values)))
-        places = np.where(np.abs(places) <= PLACES, places, math.nan)
-        up, down = 10.0 ** np.maximum(places, 0.0), 10.0 ** np.maximum(-places, 0.0)
-        return np.rint(values * up / down) * down / up
+        power = 10.0 ** (7.0 - np.floor(np.log10(np.abs(parts))))
+        short = np.rint(parts * power) / power
+        same = times(short, above, below) == stored
+    shortest = np.where(same, short, parts).view(np.asarray(result).dtype).reshape(np.shape(result))
+    return shortest if shortest.ndim else shortest.item()  # type: ignore[return-value]
 
 
 def _one(value: float, above: int, below: int) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from dalembert.on_use import on_use
 
 if TYPE_CHECKING:
+    from dalembert.documents.robots import Robot
     from rigidbody3d.attitude import from_scipy, to_scipy
     from rigidbody3d.body import Body, compose
     from rigidbody3d.freebody import FreeBody, FreeState
@@ -20,12 +21,15 @@ if TYPE_CHECKING:
     from rigidbody3d.momentum import Motion, Wrench
     from rigidbody3d.parts import read_parts
     from rigidbody3d.percussion import strike
+    from rigidbody3d.robots.inertias import check_robot_inertias, link_body
+    from rigidbody3d.robots.reading import read_robot
     from rigidbody3d.shaft import Shaft
     from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
     from rigidbody3d.top import Top, TopState
 
 # each module is loaded when one of its names is used: inertia waits for no rotation in time, and numbers for no table
 _HOMES = {
+    "dalembert.documents.robots": "Robot",
     "rigidbody3d.attitude": "from_scipy to_scipy",
     "rigidbody3d.body": "Body compose",
     "rigidbody3d.freebody": "FreeBody FreeState",
@@ -35,6 +39,8 @@ _HOMES = {
     "rigidbody3d.momentum": "Motion Wrench",
     "rigidbody3d.parts": "read_parts",
     "rigidbody3d.percussion": "strike",
+    "rigidbody3d.robots.inertias": "check_robot_inertias link_body",
+    "rigidbody3d.robots.reading": "read_robot",
     "rigidbody3d.shaft": "Shaft",
     "rigidbody3d.shapes": "SHAPES inertia_of load_mesh measure_of mesh",
     "rigidbody3d.top": "Top TopState",
@@ -48,24 +54,28 @@ __all__ = [
     "FreeBody",
     "FreeState",
     "Motion",
+    "Robot",
     "Shaft",
     "Top",
     "TopState",
     "Trajectory",
     "Wrench",
     "check",
+    "check_robot_inertias",
     "compose",
     "cones",
     "from_scipy",
     "gyroscopic_couple",
     "inertia_of",
     "integrate",
+    "link_body",
     "load_mesh",
     "measure_of",
     "mesh",
     "principal",
     "products",
     "read_parts",
+    "read_robot",
     "shift",
     "sleeping_threshold",
     "steady_precession",

@@ -27,6 +27,3 @@ def test_the_wheel_holds_the_packages_and_the_examples(tmp_path: Path) -> None:
     assert held == tracked
     assert "cli/examples/riul-rotor/rotor.csv" in held
     assert {f"{package}/py.typed" for package in INSTALLED} <= held
-
-
-# Within a command's folder, from the top down; the other files of a folder stand between these as they need.

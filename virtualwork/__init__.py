@@ -25,6 +25,8 @@ if TYPE_CHECKING:
         Torque,
         TorsionSpring,
     )
+    from virtualwork.exchange.export import export_mechanism
+    from virtualwork.exchange.programs import ImportedMechanism, import_mechanisms
     from virtualwork.family.keep import Bound
     from virtualwork.family.target import Target
     from virtualwork.mechanism import Mechanism
@@ -63,6 +65,7 @@ __all__ = [
     "Gear",
     "Guess",
     "Guide",
+    "ImportedMechanism",
     "Input",
     "Link",
     "LinkStates",
@@ -83,7 +86,9 @@ __all__ = [
     "block_on_bar",
     "counterweights",
     "crank_rod_piston",
+    "export_mechanism",
     "grashof_class",
+    "import_mechanisms",
     "ledger",
     "newton",
     "on_incline",
@@ -101,6 +106,8 @@ _HOMES = {
     "virtualwork.mechanism": "Mechanism",
     "virtualwork.motion": "Motion",
     "virtualwork.study": "counterweights",
+    "virtualwork.exchange.export": "export_mechanism",
+    "virtualwork.exchange.programs": "ImportedMechanism import_mechanisms",
     "virtualwork.family.keep": "Bound",
     "virtualwork.family.target": "Target",
     "virtualwork.study.check": "Check grashof_class",

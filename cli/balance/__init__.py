@@ -22,9 +22,9 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.read.rotor_options import Planes
+    from balancing.planes import Planes
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
 
 
@@ -66,10 +66,11 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and all that needs it are loaded only once the command line itself is in order
+    from balancing.planes import read_planes
     from cli.balance.rotors import Balancing, Carried, Request, read_rotors
     from cli.balance.tables import METHOD, MODAL, tables, warnings
-    from cli.read.rotor_options import from_options, from_table, tolerance_of
-    from cli.show.result import Result
+    from cli.read.rotor_options import from_options, tolerance_of
+    from dalembert.results.result import Result
 
     if (options.plane is None) == (options.planes is None):
         raise bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
@@ -82,11 +83,14 @@ def run(options: SimpleNamespace, show: ShowOptions) -> Result:
         refuse("shows rigid balancing: it does not go with --modes", mass=options.mass)
     shapes = None
     if options.modes is not None:
-        from cli.balance.modes import read_modes
+        from balancing.mode_shapes import read_modes
 
-        shapes = read_modes(options.modes, options.mode_count, options.rigid)
+        try:
+            shapes = read_modes(options.modes, options.mode_count, options.rigid)
+        except ValueError as error:
+            raise bad("--mode-count", error) from None
     chosen = (
-        from_table(options.planes)
+        read_planes(options.planes)
         if options.planes is not None
         else from_options(options.plane or [], sought=True)
     )

@@ -12,8 +12,8 @@ import numpy as np
 from balancing import correct, modal_corrections
 from balancing.picture import MOST, KnownMasses, known_masses
 from cli.balance.rotors import DIMENSIONS, Balancing
-from cli.show.picture import blank
 from dalembert.decimals import decimal_to_si
+from dalembert.drawing.sheet import blank
 from dalembert.errors import DataError
 from dalembert.page import sheet as sheet_page
 from dalembert.page import spelled

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, correct, modal_corrections
-from cli.read.rotor_options import Planes, Tolerance, Verdict
+from balancing.planes import Planes
+from cli.read.rotor_options import Tolerance, Verdict
 from dalembert.angles import degrees, phasor
 from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, field
-from dalembert.decimals import short
 from dalembert.errors import DataError, quote
 from dalembert.tables.table import Table, read
 from dalembert.units import UNITS, from_si, to_si
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from balancing import ModalCorrection
-    from cli.balance.modes import Modes
+    from balancing.mode_shapes import Modes
     from dalembert.arithmetic.doubled_arrays import Vectors
 
 Real = NDArray[np.float64]
@@ -237,9 +237,7 @@ class Balancing:
         angle = degrees(-self.ideal if request.remove else self.ideal)
         # at radius 0, which a given mass may lead to, there is nothing to correct
         size = np.abs(self.ideal)
-        mass = short(
-            from_si(np.divide(size, radius, out=np.zeros_like(size), where=radius > 0), "mass", unit)
-        )
+        mass = from_si(np.divide(size, radius, out=np.zeros_like(size), where=radius > 0), "mass", unit)
         fixed = self.given_mass
         mass = np.where(np.isnan(fixed), mass, from_si(fixed, "mass", unit))
         if request.mass_step is None and request.angle_step is None:

@@ -13,7 +13,6 @@ from balancing import GRADES
 from cli.balance.rotors import Balancing
 from cli.read.rotor_options import verdict_table
 from dalembert.angles import degrees
-from dalembert.decimals import short
 from dalembert.results.columns import Column, Table, apart, names, number, read_number, vector
 from dalembert.units import UNITS, from_si
 
@@ -99,13 +98,13 @@ def corrections(b: Balancing) -> Table:
             return b.exact.size / writtens(arm) * writtens(g)
 
         si = np.abs(b.ideal) / np.where(np.asarray(arm) > 0, arm, np.nan) * g
-        return apart(short(from_si(si, dimension, unit)), dimension, unit, exact)
+        return apart(from_si(si, dimension, unit), dimension, unit, exact)
 
     def turn() -> Real:
         return (-b.exact).turned(-b.ideal) if b.request.remove else b.exact.turned(b.ideal)
 
     unit, mass_unit = rotors.unbalance_unit, rotors.mass_unit
-    unbalance = number("unbalance", "unbalance", b.unbalance, unit, shortened=True)
+    unbalance = number("unbalance", "unbalance", b.unbalance, unit)
     if b.request.mass_step is not None:
         unbalance.values = b.mass * _arms(radius, mass_unit, unit)
     unbalance.error = wrong("unbalance", unit)
@@ -116,7 +115,6 @@ def corrections(b: Balancing) -> Table:
         b.mass_kg * gravity,
         weight_unit,
         wrong("force", weight_unit, radius, gravity),
-        shortened=True,
     )
     mass, of_mass = read_number("mass", "mass", b.mass, mass_unit), wrong("mass", mass_unit, radius)
     mass.error = lambda: np.where(np.isnan(b.given_mass), of_mass(), 0.0)
@@ -126,7 +124,7 @@ def corrections(b: Balancing) -> Table:
         names("rotor", [rotors.names[r] for r in b.rotor_of_row]),
         names("plane", [planes.name[p] for p in row]),
         *([] if planes.z is None else [z]),
-        number("radius", "length", radius, rotors.radius_unit or planes.radius_unit, shortened=True),
+        number("radius", "length", radius, rotors.radius_unit or planes.radius_unit),
         unbalance,
         mass,
         *([weight] if rotors.weight_unit else []),
@@ -174,14 +172,7 @@ def states(b: Balancing) -> Table:
     about = np.where(b.has_couple, b.about, np.nan)
     angle = np.where(b.has_couple, degrees(b.couple), np.nan)
     couples = [
-        number(
-            "couple_unbalance",
-            "inertia",
-            np.abs(couple),
-            couple_unit,
-            place="initial.couple_unbalance",
-            shortened=True,
-        ),
+        number("couple_unbalance", "inertia", np.abs(couple), couple_unit, place="initial.couple_unbalance"),
         number("couple_angle", "angle", angle, place="initial.couple_angle"),
         number("couple_about_z", "length", about, length, place="initial.couple_about_z"),
         residual("couple_unbalance", "inertia", couple, left, couple_unit),
@@ -190,12 +181,7 @@ def states(b: Balancing) -> Table:
         names("rotor", rotors.names),
         names("unbalances", masses.tolist(), place=None),
         number(
-            "static_unbalance",
-            "unbalance",
-            np.abs(b.static),
-            unbalance,
-            place="initial.static_unbalance",
-            shortened=True,
+            "static_unbalance", "unbalance", np.abs(b.static), unbalance, place="initial.static_unbalance"
         ),
         number("static_angle", "angle", degrees(b.static), place="initial.static_angle"),
         residual("static_unbalance", "unbalance", b.static, b.residual_static, unbalance),

@@ -374,7 +374,7 @@ def _sign(condition: str) -> str:
 
 def _figure(b: Balancing, rotor: int) -> Figure:
     from cli.balance.page import polygons
-    from cli.show.picture import blank
+    from dalembert.drawing.sheet import blank
 
     figure = blank()
     polygons(b, rotor, figure)

@@ -1,23 +1,37 @@
-"""`dalembert body`: mass properties, angular momentum, d'Alembert's wrench, a shaft on two bearings."""
+"""The commands on bodies: which options each takes, and what it shows.
+
+`body` is mass properties and forces of a motion (`moving.py`, `tables.py`, `way.py`; a robot's tensors: `inertias.py`),
+`spin` the rotation in time (`states.py`).
+"""
 
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from cli.read.options import bad, only, quantity, refuse, two_bearings, vector
+from cli.read.options import (
+    bad,
+    number_or_quantity,
+    only,
+    quantity,
+    refuse,
+    refuse_long,
+    time_range,
+    two_bearings,
+    vector,
+)
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.body.moving import ShaftRequest
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
 
 
-OPTIONS = """
+@command(
+    """
 Arguments:
   parts PARTS  CSV of parts; - is standard input.
 What:
@@ -41,11 +55,10 @@ Robot:
   check_inertias  Check the inertia tensors of a robot file.
 Further options (docs/commands.md describes them):
   about X,Y,Z  Point of reference of angular momentum and inertia, m, fixed in space (default: --fixed, else the origin).
-"""
-
-
-@command(OPTIONS, example="riul-rod")
-def run(options: SimpleNamespace, _: ShowOptions) -> Result:
+""",
+    example="riul-rod",
+)
+def body(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Compute mass, centre of mass and inertia of a body from its parts, its angular momentum, and the forces and
     moments of its motion.
 
@@ -58,8 +71,8 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.body import tables
     from cli.body.moving import MovingBody, Request
-    from cli.read.root_search import pair
-    from cli.show.result import Result, with_found
+    from cli.read.root_search import pair, with_found
+    from dalembert.results.result import Result
     from rigidbody3d.parts import read_bodies, read_table
 
     request = Request(
@@ -128,14 +141,12 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
 
 
 def _inertias(file: str) -> Result:
-    from cli.body.inertias import checks, table, warnings
-    from cli.formats import read_robot
-    from cli.show.result import Result
-    from dalembert.tables.files import read_bytes
+    from cli.body.inertias import table, warnings
+    from dalembert.results.result import Result
+    from rigidbody3d import check_robot_inertias, read_robot
 
-    name, data = read_bytes(file)
-    robot = read_robot(name, data, None if file == "-" else Path(file).parent)
-    each = checks(robot)
+    robot = read_robot(file)
+    each = check_robot_inertias(robot)
     return Result(
         tables={"inertias": lambda: table(each)},
         warnings=warnings(robot, each),
@@ -180,3 +191,82 @@ def _axis(text: str) -> tuple[float, float, float]:
     if not any(direction):
         raise bad("--axis", f"'{text}': expected a direction: all three numbers are 0")
     return direction
+
+
+@command(
+    """
+Arguments:
+  body BODY.toml  The body and its state; - is standard input.
+What:
+  time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
+  at T...  Time in seconds; repeatable (default: 0).
+  find NAME  Number of the file to find: omega.z, inertia.3, top.mgl, or tilt of a top.
+  so_that QUANTITY=VALUE  With --find: wanted value of a result, such as slow=0.5rad_s or momentum.z=2.
+  only NAME,...  Show only these results: omega, attitude, momentum, energy, drift, period, nutation_period, cones, steady.
+How:
+  method exact|integrate  Use the closed form, or integrate (default: exact where a closed form exists).
+  integrator DOP853|splitting=DOP853  Method of integration; splitting is for a symmetric top.
+Output:
+  page FILE(.html)  Write a page that replays the rotation, with curves and values.
+""",
+    example="tennis-racket",
+)
+def spin(options: SimpleNamespace, show: ShowOptions) -> Result:
+    """Compute the rotation of a body in time: angular velocity, attitude, momentum and energy at any instant.
+
+    BODY.toml has inertia = [I1, I2, I3] in kg·m² (or a 3 × 3 matrix, or parts = "parts.csv"), omega in body axes in
+    rad/s, and attitude = [w, x, y, z], a quaternion from body to space (default [1, 0, 0, 0]). A top has a table [top]
+    with mgl in N·m, weight times distance: then inertia is about the fixed point, the axis is body z and gravity acts
+    along -z of space. A torque is torque = [x, y, z] in N·m with frame = "body" or "space". Other units stand in
+    quotes, such as "700 rpm".
+    """
+    import numpy as np
+
+    from cli.body import states
+    from cli.read.root_search import pair, with_found
+    from dalembert.results.result import Result
+    from rigidbody3d.rotation_in_time import Rotation
+    from rigidbody3d.turning_body import read_body
+
+    if options.time is not None and options.at:
+        raise bad("--at", "expected --time or --at, not both")
+    if options.time is not None:
+        times = time_range("--time", options.time)
+    else:
+        times = [number_or_quantity("--at", text, "time") for text in options.at or ["0"]]
+    chosen = only(options.only, states.QUANTITIES)
+    if options.page is not None:
+        refuse_long(len(times))
+    turning = read_body(options.body)
+    rotation = Rotation(turning, np.array(times), options.method, options.integrator)
+    sought, solution = pair(options.find, options.so_that), None
+    if sought is not None:
+        rotation, solution = states.find(rotation, *sought)
+        turning = rotation.body
+    if rotation.exact and options.integrator != "DOP853":
+        raise bad("--integrator", "expected --method integrate too: this rotation has a closed form")
+    rotation.states  # noqa: B018  faults of the data are errors before anything is shown
+
+    def moving() -> bytes:
+        from dalembert.results.chosen_units import shown
+        from rigidbody3d.animation import turning_page
+
+        table = shown(states.states(rotation), show.chosen_units)
+        made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
+        return made.html.encode()
+
+    result = Result(
+        way=partial(states.way, rotation),
+        tables=states.tables(rotation, chosen),
+        head={"method": "exact" if rotation.exact else rotation.integrator},
+        figure=partial(states.draw, rotation),
+        beside={} if options.page is None else {options.page: moving},
+        method=states.METHOD,
+        about={"title": turning.name or "Rotation in time"} | turning.about,
+        warnings=[
+            *turning.warnings,
+            *states.warnings(rotation, () if options.only is None else chosen),
+            *(states.coarse(rotation) if options.page else ()),
+        ],
+    )
+    return result if solution is None else with_found(result, solution)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.read.rotor_options import Planes
+from balancing.planes import Planes
 from dalembert.angles import degrees
 from rigidbody3d import Body, Motion, Shaft
 from rigidbody3d.parts import Parts

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cli.body.moving import AXES, CorrectionMass, MovingBody
-from cli.show.picture import blank
 from dalembert.angles import degrees
+from dalembert.drawing.sheet import blank
 from dalembert.results.columns import Column, Table, document_unit, names, number, stacked
 from dalembert.units import G0
 from rigidbody3d.parts import SEVERAL

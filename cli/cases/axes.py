@@ -11,12 +11,12 @@ import numpy as np
 
 from cli.cases.inputs import Axis, Driven, Grid, Varied, with_numbers
 from cli.read import options
-from cli.read.written import DEGREES, ROWS, Range, Written
 from dalembert.decimals import Factor
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.quantities import decimals, exactly, exactly_in_degrees, is_number, option_digits
 from dalembert.units import UNITS
+from dalembert.written import DEGREES, ROWS, Range, Written
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.units import Units
 
@@ -232,7 +232,7 @@ def cases_axis(m: Mechanism, path: str, elsewhere: set[int], remarks: list[str])
     for header in table.header:
         if "." in header and header not in used:
             try:
-                (*_, last) = named(m, header.strip(), every)
+                (*_, last) = named(m, header.strip())
             except DescriptionError as error:
                 raise DataError(f"{table.file}: column {header}: {error}") from None
             raise DataError(f"{table.file}: column {header}: expected one number, such as {last.header}")

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from uuid import UUID, uuid4
 
 from cli.cases.cases import Cases
-from cli.show.result import Result
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Column, Table
 from dalembert.results.columns import document as result_document
+from dalembert.results.result import Result
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ class Study:
         """The number of states of a case that the page shows."""
         return self.cases.poses
 
-    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+    def page(self, cases: Sequence[tuple[str, Case]], units: Mapping[str, str] | None) -> bytes:
         """Return the page on which every case, by its name, moves."""
         raise NotImplementedError
 

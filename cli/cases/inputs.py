@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.read.written import ROWS, Range, Written
 from dalembert.angles import read_degrees
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.units import UNITS
+from dalembert.written import ROWS, Range, Written
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

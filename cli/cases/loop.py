@@ -17,11 +17,12 @@ from cli.cases.case import AtOnce, Case, Study, emptied, joined, length, like, u
 from cli.cases.cases import naming
 from cli.cases.remarks import Remarks
 from cli.read.options import bad, processes
-from cli.show.result import Result, Written, with_found
-from cli.show.terminal import progress
+from cli.read.root_search import with_found
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.errors import DataError
 from dalembert.results.columns import Column, Table
+from dalembert.results.result import Result, Written
+from dalembert.terminal import progress
 from virtualwork import MechanismError
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 
     from cli.cases.case import Together
     from cli.cases.cases import Rows
-    from cli.show.result import Form, Part
     from dalembert.results.columns import Document
+    from dalembert.results.result import Form, Part
     from dalembert.results.way import Topic
 
     Mask = NDArray[np.bool_]
@@ -50,7 +51,7 @@ def result(study: Study, options: SimpleNamespace) -> Result:
         loop = Loop(study, values.get("workers") or 1)
         warnings = [*cases.warnings, *study.warnings()]
         if page is not None:
-            from cli.show.picture import refuse_long
+            from cli.read.options import refuse_long
 
             refuse_long(study.frames * cases.count)
         if cases.varied is not None:
@@ -73,7 +74,7 @@ def result(study: Study, options: SimpleNamespace) -> Result:
             result = study.case(cases.nominal).result()
             result.warnings = [*warnings, *result.warnings]
     if page is not None:
-        result.beside = {**result.beside, page: lambda: study.page(loop.by_name(), show.units)}
+        result.beside = {**result.beside, page: lambda: study.page(loop.by_name(), show.chosen_units)}
     if cases.found is not None:
         result = with_found(result, cases.found)
     if show.steps:

@@ -9,10 +9,11 @@ import numpy as np
 
 from cli.cases.analysis import Analysis
 from cli.cases.poses import cells_of, column, keys_of, solved, table
-from cli.show.picture import blank, shown
-from cli.show.result import Section, Sheet
 from dalembert.angles import read_degrees
+from dalembert.drawing.sheet import blank
+from dalembert.results.chosen_units import shown
 from dalembert.results.columns import Column, Table
+from dalembert.results.result import Section, Sheet
 from dalembert.units import UNITS, from_si, written
 from virtualwork import MechanismError, quantities
 from virtualwork.quantities import Component, links, points
@@ -20,8 +21,8 @@ from virtualwork.quantities import Component, links, points
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.result import Bars
     from dalembert.page import Shown
+    from dalembert.results.bars import Bars
     from virtualwork import Mechanism
     from virtualwork.animation import JointForce, Series
 
@@ -68,7 +69,9 @@ SWEEP = 361
 """Poses of a turn, where one pose was requested."""
 
 
-def page(analyses: Sequence[tuple[str, Analysis]], units: str | None, bare: Mapping[str, str]) -> bytes:
+def page(
+    analyses: Sequence[tuple[str, Analysis]], units: Mapping[str, str] | None, bare: Mapping[str, str]
+) -> bytes:
     """Return the page of all points and links: it computes where the formulas can be written into it, else it replays.
 
     Parameters
@@ -95,7 +98,7 @@ def page(analyses: Sequence[tuple[str, Analysis]], units: str | None, bare: Mapp
 
 
 def _computing(
-    analyses: Sequence[tuple[str, Analysis]], units: str | None, bare: Mapping[str, str]
+    analyses: Sequence[tuple[str, Analysis]], units: Mapping[str, str] | None, bare: Mapping[str, str]
 ) -> bytes | str:
     """Return the page that computes, or the reason why there is none."""
     from virtualwork.animation import JointForce
@@ -157,7 +160,7 @@ def _name(variant: str, analysis: Analysis, i: int) -> str:
 
 
 def _series(
-    variant: str, analysis: Analysis, units: str | None, computed: Analysis | None = None
+    variant: str, analysis: Analysis, units: Mapping[str, str] | None, computed: Analysis | None = None
 ) -> Iterator[Series]:
     """Yield every assembly but the one that the page computes; none of a variant that cannot be assembled, which a warning names."""
     from virtualwork.animation import JointForce, Series

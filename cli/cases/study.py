@@ -14,13 +14,14 @@ import numpy as np
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import AtOnce, Case, Study, like
+from cli.cases.cases import with_root
 from cli.cases.inputs import Inputs
-from cli.show.result import Result, Section, Sheet
-from cli.show.terminal import progress
 from dalembert.dataclass import dataclass, field, replace
 from dalembert.results.columns import Table
 from dalembert.results.columns import document as result_document
+from dalembert.results.result import Result, Section, Sheet
 from dalembert.results.text import heading
+from dalembert.terminal import progress
 from virtualwork.formulas.forces import Effort, NewtonEuler
 from virtualwork.formulas.loops import Column, Margin, Size
 from virtualwork.formulas.numbers import condition
@@ -214,8 +215,6 @@ class PoseStudy(Study):
         """Return the study with the number that --find seeks."""
         if self.find is None and self.so_that is None:
             return self
-        from cli.cases.find import with_root
-
         return replace(self, cases=with_root(self.cases, self.find, self.so_that))
 
     def case(self, analysis: Analysis) -> PoseCase:
@@ -252,7 +251,7 @@ class PoseStudy(Study):
         show = self.show
         self.cases.nominal.check_size(json=show.as_json, table=show.needs_table, times=times)
 
-    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+    def page(self, cases: Sequence[tuple[str, Case]], units: Mapping[str, str] | None) -> bytes:
         """Return the page on which every mechanism moves."""
         from cli.cases.picture import page
 

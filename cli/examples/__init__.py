@@ -15,7 +15,7 @@ from dalembert.hints import nearest
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Section
+    from dalembert.results.result import Result, Section
 
 EXAMPLES = Path(__file__).parent
 ABOUT = "example.toml"
@@ -37,7 +37,7 @@ Arguments:
 @reported(OPTIONS)
 def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     """List the worked examples; with NAME, write its input files into the current folder and show its command."""
-    from cli.show.result import Result, Sheet
+    from dalembert.results.result import Result, Sheet
 
     name = options.name
     listed = names() if name is None else [name]
@@ -91,8 +91,8 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
 
 def _section(name: str, example: Mapping[str, str], files: Mapping[Path, tuple[bytes, str]]) -> Section:
     """Return what a report says of an example, and its files."""
-    from cli.show.report import CODE, text_of_file
-    from cli.show.result import Section
+    from dalembert.results.report import CODE, text_of_file
+    from dalembert.results.result import Section
 
     parts = [example["line"], f"source: {example['source']}", CODE + example["command"]]
     for here, (data, _) in files.items():

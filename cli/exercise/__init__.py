@@ -1,4 +1,8 @@
-"""`dalembert exercise`: a class's variants of an exercise, with sheets, key, solutions and question banks."""
+"""The commands for teaching: `exercise` makes a class's variants with sheets, key, solutions and question banks, `grade` marks.
+
+Which variants: `variants.py`, with numbers that `solving.py` has the command work out; the files: `sheets.py`,
+`questions.py`; the marks: `marks.py`.
+"""
 
 from __future__ import annotations
 
@@ -20,19 +24,9 @@ if TYPE_CHECKING:
     from cli.exercise.description import Exercise
     from cli.exercise.sheets import Student
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
-OPTIONS = """
-Arguments:
-  file FILE.toml  The exercise.
-What:
-  students NUMBER|ROSTER.csv=1  Number of students, or their table with a column student.
-  seed N(0-)=1  Random seed of the drawn values.
-  folder -o --output FOLDER  Folder to write: sheets, answers.csv, key.csv, solutions.html, moodle.xml.
-  page  Put a page that computes on each sheet. It is for practice: it shows the answers.
-  system --for prairielearn|numbas...  Write the questions for this system too; repeatable.
-"""
 MOST = 2000
 
 
@@ -48,8 +42,22 @@ def _show(result: Result, show_options: ShowOptions, call: object) -> None:
     typer.echo(result.notes(), nl=False)
 
 
-@with_options(OPTIONS, ("json", "expect", "rtol"), _show, example="exercise-rotor")
-def run(options: SimpleNamespace, _: ShowOptions) -> Result:
+@with_options(
+    """
+Arguments:
+  file FILE.toml  The exercise.
+What:
+  students NUMBER|ROSTER.csv=1  Number of students, or their table with a column student.
+  seed N(0-)=1  Random seed of the drawn values.
+  folder -o --output FOLDER  Folder to write: sheets, answers.csv, key.csv, solutions.html, moodle.xml.
+  page  Put a page that computes on each sheet. It is for practice: it shows the answers.
+  system --for prairielearn|numbas...  Write the questions for this system too; repeatable.
+""",
+    ("json", "expect", "rtol"),
+    _show,
+    example="exercise-rotor",
+)
+def exercise(options: SimpleNamespace, _: ShowOptions) -> Result:
     """Make the variants of an exercise for a class: a sheet for each student, a table for the answers, key and solutions.
 
     FILE.toml has the command that solves the exercise, a title, and a text with drawn values, {links.crank.B.x} or
@@ -64,7 +72,7 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.exercise.sheets import answers_csv, filled, key_table, sheet_page, solutions
     from cli.exercise.variants import several, variants, workshop
     from cli.show.output import options_of
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.text import csv_text
 
     if not options.folder:
@@ -265,3 +273,45 @@ def _refuse(folder: Path, files: Mapping[str, bytes]) -> None:
             raise DataError(
                 f"{answers}: its answers would be lost: expected another folder; nothing was written"
             )
+
+
+@with_options(
+    """
+Arguments:
+  file FILE.toml  The exercise.
+  answers ANSWERS  Table of the answers; - is standard input.
+What:
+  key KEY.csv  Right answers of each student (default: key.csv in the folder of the answers).
+""",
+    ("json", "output", "text", "report", "about", "no_color"),
+    show,
+    example="exercise-slider-crank",
+)
+def grade(options: SimpleNamespace, _: ShowOptions) -> Result:
+    """Mark the answers to an exercise: right, rounding, figures, carried, wrong or blank, with the likely mistake.
+
+    ANSWERS is the answers.csv of dalembert exercise, with the column answer filled in. It has the columns student,
+    quantity, answer, unit and those that name the row; further columns are kept. An answer may have a decimal comma,
+    a power of ten and its own unit: 1,23 or 1.23e0 or 18.1 kJ. An angle may differ by whole turns. The status is 0
+    however wrong the answers are.
+    """
+    from cli.exercise.description import read_exercise
+    from cli.exercise.marks import METHOD, mark_all, read_students, tables
+    from cli.exercise.variants import several, workshop
+    from dalembert.results.result import Result
+
+    with workshop(read_exercise(options.file)) as shop:
+        exercise = shop.exercise
+        students = read_students(exercise, options.answers, options.key)
+        marks = mark_all(exercise, shop, students)
+    points = sum(mark.points for mark in marks)
+    of = float(exercise.points) * len(students)
+    return Result(
+        tables=tables(exercise, students, marks),
+        companions=["totals"],
+        notes=lambda: f"{exercise.title}: {several(len(students), 'student')}, {points:g} of {of:g} points",
+        method=METHOD,
+        # the marks hold the answers; the tables of each student's numbers are gone with the workshop
+        shows_input=True,
+        about={"title": f"Marks: {exercise.title}"},
+    )

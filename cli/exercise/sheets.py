@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 from cli.exercise.description import Answer, Ask, Exercise, Value, unit_text
 from cli.exercise.solving import DataTable, Workshop, cell_of
 from cli.exercise.variants import Variant
-from cli.show.commands import ShowOptions
-from cli.show.report import html_part, report, spelled
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
 from dalembert.results.columns import Column, Table, names
+from dalembert.results.report import html_part, report, spelled
 from dalembert.results.text import csv_text
 from dalembert.units import parted
 
@@ -283,7 +282,7 @@ def _solution(variant: Variant, who: Sequence[str], drawing: str) -> Iterator[st
             if result.shows_way
             else replace(result, shows_input=True)
         )
-        for each in report(shown, ShowOptions(), {}, None).pages:
+        for each in report(shown).pages:
             for name, parts in each.sections:
                 yield f"<h3>{html.escape(name)}</h3>\n"
                 yield from map(html_part, parts)

@@ -26,8 +26,8 @@ from dalembert.tables.sources import open_source
 from dalembert.units import parted
 
 if TYPE_CHECKING:
+    from balancing.planes import Planes
     from cli.balance.rotors import Rotors
-    from cli.read.rotor_options import Planes
 
 MECHANISM = ("mechanism", "forces", "inspect", "equilibrium", "simulate", "tolerance")
 """Commands on a mechanism's file: they take --set."""
@@ -381,11 +381,12 @@ class Problem:
 
     def known_masses(self) -> tuple[Rotors, Planes]:
         """Read the masses and the correction planes of `dalembert balance`."""
+        from balancing.planes import read_planes
         from cli.balance.rotors import read_rotors
-        from cli.read.rotor_options import from_options, from_table
+        from cli.read.rotor_options import from_options
 
         own = self.parameters
-        planes = from_table(own["planes"]) if own["planes"] else from_options(own["plane"], sought=True)
+        planes = read_planes(own["planes"]) if own["planes"] else from_options(own["plane"], sought=True)
         return read_rotors(own["table"], self.gravity, needs_z=planes.several), planes
 
     def result(self, *further: str) -> Solved:

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cli.field.field_balancing import FieldBalancing
     from cli.field.tables import Tables
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Sheet
     from dalembert.results.columns import Column
+    from dalembert.results.result import Result, Sheet
 
 
 METHOD = (
@@ -202,7 +202,7 @@ def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -
     from balancing.runs.runs import latest
     from cli.field.remarks import sense, warnings
     from cli.field.rotor import each, way
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     remarks, day = warnings(b), latest(b.runs.table)
     made = _tables(b, remarks)

@@ -18,10 +18,11 @@ from cli.field.rotor import Rotor, each
 from cli.field.tables import Rows, Tables, amplitude_unit, masses_text
 from cli.read.options import bad
 from cli.read.rotor_options import verdict_table
-from cli.show.picture import blank
-from cli.show.result import Bar, Bars, Section, Sheet
 from dalembert.angles import degrees
+from dalembert.drawing.sheet import blank
+from dalembert.results.bars import Bar, Bars
 from dalembert.results.columns import Column, Table
+from dalembert.results.result import Section, Sheet
 from dalembert.results.text import with_uncertainty
 
 if TYPE_CHECKING:

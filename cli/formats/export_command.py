@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
@@ -14,17 +12,9 @@ from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result, Sheet
-    from virtualwork import Mechanism
-
-FORMATS = {
-    ".dxf": "drawing (DXF), and curves over the travel of the input",
-    ".svg": "drawing (SVG), and curves over the travel of the input",
-    ".csv": "table of the input and of every moving point over its travel",
-    ".urdf": "robot (URDF) with closed loops",
-    ".sdf": "robot (SDF) with closed loops",
-    ".xml": "robot (MJCF, of MuJoCo) with closed loops",
-}
+    from dalembert.results.result import Result, Sheet
+    from virtualwork.describe.cams import CamDrive
+    from virtualwork.describe.description import Description
 
 PROFILES = (".csv", ".dxf", ".svg")
 
@@ -54,10 +44,11 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     from cli.cases.axes import grids
     from cli.cases.cases import load
     from cli.cases.inputs import of_one
-    from cli.formats.drawing import cam_bytes, of_follower
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.tables.files import name_of
     from virtualwork import MechanismError
+    from virtualwork.exchange.drawing import SeveralInputs, cam_bytes
+    from virtualwork.exchange.export import FORMATS, file_bytes
 
     output, file, profile = Path(options.output), options.file, options.profile
     suffix = output.suffix.lower()
@@ -75,15 +66,17 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     name = Path(name_of(file)).name
     try:
         if profile is not None:
-            data, notes = cam_bytes(m, of_follower(m, profile), suffix, name, bare)
+            data, notes = cam_bytes(m, _follower(m, profile), suffix, name, bare)
         else:
             data, notes = file_bytes(m, inputs, suffix, name, bare)
     except MechanismError as error:
         raise DataError(f"{file}: {error}") from None
+    except SeveralInputs as error:
+        raise DataError(f"{error}: use `dalembert mechanism --cases`") from None
 
     def sheets() -> list[Sheet]:
         from cli.cases.picture import posed
-        from cli.show.result import Section
+        from dalembert.results.result import Section
 
         whole = [] if notes else ["Nothing is left out."]
         first = Section("Written", [f"{output.name}: {FORMATS[suffix]}, {len(data)} bytes", *whole])
@@ -98,38 +91,21 @@ def run(options: SimpleNamespace, _: ShowOptions) -> Result:
     )
 
 
-def file_bytes(
-    m: Mechanism, inputs: tuple[float, ...], suffix: str, file: str, bare: Mapping[str, str]
-) -> tuple[bytes, list[str]]:
-    """Return the file of a mechanism that starts at the inputs, rad or m, and what is left out.
+def _follower(m: Description, name: str) -> CamDrive:
+    """Return the cam that moves a follower, which is named by its sliding point or its arm.
 
-    `bare` are the units that the mechanism's own file uses.
+    Raises
+    ------
+    BadParameter
     """
-    from cli.formats.drawing import Travel, curves, draw, picture, unit_of
+    from dalembert.hints import nearest
 
-    travel = Travel(m)
-    length, metres = unit_of(bare, suffix)
-    if suffix == ".csv":
-        return curves(travel, length, bare.get("angle", "rad")), []
-    comment = _comment(m, inputs, file)
-    if suffix in (".dxf", ".svg"):
-        data = picture(draw(m, inputs, travel, length, metres), suffix, comment, metres)
-        several = travel.motion is None
-        return data, ["curves are left out: they need one input, and it has several"] if several else []
-    from cli.formats import mjcf, sdf, urdf
-    from cli.formats.skeleton import Skeleton
-
-    writers = {".urdf": urdf.write, ".sdf": sdf.write, ".xml": mjcf.write}
-    return writers[suffix](Skeleton(m, inputs, travel), comment)
-
-
-def _comment(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:
-    """Return the comment: what it is, from which file, by which version, in which pose."""
-    from importlib.metadata import version
-
-    poses = ", ".join(
-        f"{e.name} = {v if e.is_slide else math.degrees(v):.12g} {'m' if e.is_slide else 'deg'}"
-        for e, v in zip(m.inputs, inputs, strict=True)
-    )
-    title = f"{m.name}, " if m.name else ""
-    return " ".join(f"{title}from {file} by dalembert {version('dalembert')}, at {poses}".split())
+    names = {str(cam.slider or cam.follower): number for number, cam in enumerate(m.cams)}
+    if name not in names:
+        expected = (
+            f"one of the followers {', '.join(names)}{nearest(name, names)}"
+            if names
+            else "a mechanism with [[cams]]"
+        )
+        raise bad("--profile", f"'{name}': expected {expected}")
+    return m.cam_drives[names[name]]

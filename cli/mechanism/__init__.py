@@ -2,22 +2,23 @@
 
 `mechanism`, `forces`, `inspect`, `equilibrium`, `simulate`, `tolerance` and `fit` each have one study here (`poses.py`,
 `cycle.py`, `inspection.py`, `equilibria.py`, `simulation.py`, `tolerances.py`, `fits.py`), which `cli/cases` runs for
-every case.
+every case. `work` balances a table of link states without a mechanism (`virtual_power.py`).
 """
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import typer
 
-from cli.read.options import bad, refuse, time_range
+from cli.read.options import bad, plane_vector, refuse, time_range
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 # -- the options that several of them take ----------------------------------------------------------------------
 
@@ -339,3 +340,47 @@ def fit(options: SimpleNamespace, show: ShowOptions) -> Result:
         workers=workers,
     )
     return result(study, options)
+
+
+@command(
+    """
+Arguments:
+  states STATES  CSV of link states with the unknown marked ?; - is standard input.
+What:
+  gravity GX,GY  Gravity, m/s², such as 0,-9.81 (default: none).
+Output:
+  ledger  Show the power of every load (default: the unknowns).
+""",
+    example="riul-slider-crank",
+)
+def work(options: SimpleNamespace, _: ShowOptions) -> Result:
+    """Find the unknown force or torque that balances a table of link states, by virtual power.
+
+    STATES has a row for each link, at each step (instant). Its columns are step, link, mass_*, inertia_*; vx_* vy_* and
+    ax_* ay_* of the centre of mass; omega_*, alpha_*; the applied force fx_* fy_* with the velocity fvx_* fvy_* of its
+    point; torque_*. The star is a unit: mass_kg, vx_m_s, omega_rad_s, torque_N_m. Empty cells are zero; an empty fv is
+    the velocity of the centre of mass. One cell of a force or torque holds ?. Several unknowns are marked ?NAME; they
+    need as many fields of virtual velocities, named in a column field.
+    """
+    g = 0j if options.gravity is None else plane_vector("--gravity", options.gravity, "acceleration")
+    from cli.mechanism.virtual_power import METHOD, draw, tables, way
+    from dalembert.results.result import Result
+    from virtualwork.textbook.state_table import read_states
+    from virtualwork.textbook.table_balance import WorkBalance
+
+    table = read_states(options.states)
+    balance = WorkBalance(table, g)
+    weightless = (
+        ["--gravity: there is no column mass_*: no weights from it"]
+        if g and "mass" not in table.values
+        else []
+    )
+
+    return Result(
+        tables=tables(balance, ledger_first=options.ledger),
+        figure=partial(draw, balance),
+        method=METHOD,
+        way=partial(way, balance),
+        about={"title": "Balance of virtual power"},
+        warnings=[*table.table.warnings, *table.warnings, *weightless, *balance.warnings],
+    )

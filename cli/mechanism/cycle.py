@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.cases.analysis import Analysis
-    from cli.show.result import Result
+    from dalembert.results.result import Result
     from dalembert.results.way import Topic
 
 Document = dict[str, Any]

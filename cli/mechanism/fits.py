@@ -16,13 +16,13 @@ from cli.cases.cases import beside
 from cli.cases.inputs import Varied
 from cli.mechanism.targets import targets, wanted, weights
 from cli.read import options
-from cli.show.picture import blank
-from cli.show.result import Result
 from dalembert.angles import read_degrees
 from dalembert.arithmetic.exact import EPS
 from dalembert.dataclass import dataclass, field, replace
+from dalembert.drawing.sheet import blank
 from dalembert.errors import DataError
 from dalembert.results.columns import ABSENT, Column, Table, names, number
+from dalembert.results.result import Result
 from dalembert.results.way import Topic, figures
 from dalembert.tables.files import read_bytes
 from virtualwork.describe import DescriptionError

@@ -365,7 +365,7 @@ def _body(body: FreeBody, i: int) -> dict[str, Any]:
 
 
 def _diagrams(bodies: list[FreeBody], i: int) -> Figure:
-    from cli.show.picture import blank
+    from dalembert.drawing.sheet import blank
     from virtualwork.picture.free_bodies import draw
 
     figure = blank()

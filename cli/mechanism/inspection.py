@@ -25,8 +25,8 @@ from virtualwork.study.loops import loops
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.result import Result
     from dalembert.results.columns import Cell
+    from dalembert.results.result import Result
     from virtualwork import Mechanism
     from virtualwork.formulas.quantity import Quantity
     from virtualwork.study.strokes import Stroke

@@ -437,7 +437,7 @@ def _parts_table(every: list[Parts], i: int, unit: str, above: str) -> Table:
 
 
 def _polygons(every: list[Parts], i: int) -> Figure:
-    from cli.show.picture import blank
+    from dalembert.drawing.sheet import blank
     from virtualwork.picture.polygons import rates
 
     figure = blank()

@@ -17,13 +17,13 @@ from cli.cases.remarks import idle_friction
 from cli.mechanism.motion_tables import ENERGY, columns_of, documents, drift, inputs_of, trusted, way
 from cli.read import options
 from cli.show.commands import ShowOptions
-from cli.show.picture import shown as on_page
-from cli.show.terminal import progress_in_time
 from dalembert.arithmetic.engines import anew
 from dalembert.dataclass import dataclass, replace
 from dalembert.errors import DataError
+from dalembert.results.chosen_units import shown as on_page
 from dalembert.results.columns import Column, Table, names
 from dalembert.tables.files import name_of
+from dalembert.terminal import progress_in_time
 from virtualwork import MechanismError, quantities
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.forces import Shaking
@@ -217,13 +217,13 @@ class Motion(Case):
 
     def figure(self) -> Figure:
         """Draw inputs, speeds and energy over time, and the mechanism at instants."""
-        from cli.show.picture import blank
+        from dalembert.drawing.sheet import blank
 
         drawn = blank()
         self.run.plot(drawn)
         return drawn
 
-    def series(self, variant: str, units: str | None) -> Series:
+    def series(self, variant: str, units: Mapping[str, str] | None) -> Series:
         """Return all points and links over time for a page, whatever --only names."""
         from virtualwork.animation import JointForce
 
@@ -293,7 +293,7 @@ class Simulation(Study):
         """The number of states of a variant that the page shows."""
         return len(self.times)
 
-    def page(self, cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+    def page(self, cases: Sequence[tuple[str, Case]], units: Mapping[str, str] | None) -> bytes:
         """Return the page of motions under forces: the longest is drawn in full, the others as ghosts."""
         from virtualwork.animation import moving_page
 

@@ -1,8 +1,8 @@
-"""The effect of the tolerances of the file on every number: to first order, from drawn mechanisms, as a picture."""
+"""The effect of the tolerances of the file on every number: to first order, from drawn mechanisms; its worked solution."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,14 +11,12 @@ import numpy as np
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
 from cli.cases.case import Case, Study
-from cli.cases.poses import bounds_of, cells, keys_of
+from cli.cases.poses import bounds_of, cells, keys_of, of_rows
 from cli.cases.study import METHOD
-from cli.mechanism.tolerance_terms import by_quantity, largest, way
 from cli.read.options import processes
 from dalembert.dataclass import dataclass
-from dalembert.drawing.amounts import NOISE
 from dalembert.errors import DataError
-from dalembert.results.columns import Column, Table, names
+from dalembert.results.columns import Column, Table, finite, names
 from dalembert.results.way import Topic
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, rounded, spread, summary
@@ -27,12 +25,11 @@ from virtualwork.formulas.quantity import Quantity
 from virtualwork.quantities import Component
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cli.cases.poses import Reals
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
@@ -265,8 +262,27 @@ class Tolerances(Case):
         return way(self.analysis, self.numbers, self.slopes, self.linear, self.limits)
 
     def figure(self) -> Figure:
-        """Draw the band of paths, and the share of each dimension."""
-        return draw(self)
+        """Draw the band of paths, and the share of each dimension; without points, the band of a number over the input."""
+        from virtualwork.picture.tolerance import Band, draw
+
+        m, motion = self.analysis.mechanism, self.analysis.motions[0]
+        points = (each.key for each in self.numbers if isinstance(each.key, Point) and not each.key.order)
+        paths = {key: motion.point(str(key.node)).complex(0) for key in points if key.node not in m.ground}
+        band = None
+        if not paths:
+            first = self.numbers[0]
+            base = next(c for c in self.table().columns if c.header == first.header)
+            values = np.array([np.nan if v is None else float(v) for v in base.values])
+            q = self.analysis.inputs.whole.shown[:, 0]
+            band = Band(
+                first.key,
+                first.header,
+                self.analysis.input_columns[0],
+                q,
+                values,
+                self.linear[first.header].worst,
+            )
+        return draw(m.name, m.size, paths, self.limits, self.slopes, band)
 
 
 @dataclass(frozen=True)
@@ -315,133 +331,82 @@ def _sample(sample: Drawn) -> dict[str, Reals]:
 _FIELDS = ("mean", "sd", "quantiles", "errors")
 
 
-# --- the picture ----------------------------------------------------------------------------------------------------
-# of the picture's width: a band that is narrower is drawn wider
-SEEN = 0.02
-BARS = 10
+# --- one pose on a terminal, the largest shares, the worked solution ------------------------------------------------
+def by_quantity(table: Table, shown: Sequence[Component]) -> list[Table]:
+    """Return the table of one pose as short tables: a row for each quantity that varies, one table for each unit.
+
+    The first has what names the pose.
+    """
+    columns = {each.header: each for each in table.columns}
+    units: dict[str, tuple[list[str], list[dict[str, Column]]]] = {}
+    for quantity in shown:
+        own = columns[quantity.header]
+        effects = (c for c in table.columns if isinstance(c.place, tuple) and own.header in c.place)
+        row = {f"value_{own.unit}": own} | {c.header.removeprefix(f"{own.name}_"): c for c in effects}
+        titles, rows = units.setdefault(own.unit, ([], []))
+        titles.append(quantity.names[0] if quantity.names else own.name)
+        rows.append(row)
+    made = [Table([each for each in table.columns if each.header in table.keys])]
+    for titles, rows in units.values():
+        numbers = (of_rows(head, rows) for head in rows[0])
+        made.append(Table([Column("quantity", "", titles), *numbers], ["quantity"]))
+    return made
 
 
-def draw(tolerances: Tolerances) -> Figure:
-    """Draw the band of the path of each point, and the shares; without points, bands over the input."""
-    from matplotlib.figure import Figure
-
-    points = [each.key for each in tolerances.numbers if isinstance(each.key, Point) and not each.key.order]
-    points = list(
-        dict.fromkeys(key for key in points if key.node not in tolerances.analysis.mechanism.ground)
+def largest(linear: Mapping[str, Spread], limits: Mapping[Dimension, float]) -> Table:
+    """Return the dimensions with the largest shares of each number, in the mean of the poses."""
+    texts, paths = [], [d.path for d in limits]
+    for effect in linear.values():
+        finite = np.isfinite(effect.shares).any()
+        mean = np.nanmean(effect.shares, axis=1) if finite else np.zeros(len(paths))
+        order = np.argsort(-mean, kind="stable")[:3]
+        texts.append(", ".join(f"{paths[i]} {mean[i] * 100:.3g} %" for i in order if mean[i] > 0))
+    above = "shares of the variance, means over the poses"
+    return Table(
+        [names("column", linear, None), names("dimensions", texts, None)], ("column",), "", above=above
     )
-    figure = Figure(figsize=(11.0, 5.2), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
-    if points:
-        _paths(left, tolerances, points)
-        _shares(right, tolerances, points, "variance of the position")
-    else:
-        header = tolerances.numbers[0].header
-        _over_input(left, tolerances, header)
-        _shares(right, tolerances, [tolerances.numbers[0].key], f"variance of {header}")
-    figure.suptitle(tolerances.analysis.mechanism.name, fontsize=10)
-    return figure
 
 
-def _paths(axes: Axes, tolerances: Tolerances, points: list[Point]) -> None:
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgb
-
-    analysis = tolerances.analysis
-    scale, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
-    sizes = np.array(list(tolerances.limits.values()))
-    paths = {key: analysis.motions[0].point(str(key.node)).complex(0) * scale for key in points}
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"x, {unit}")
-    axes.set_ylabel(f"y, {unit}")
-    axes.grid(color="0.9", lw=0.6)
-    axes.set_axisbelow(True)
-    if analysis.inputs.n == 1:
-        worst = {}
-        for key in points:
-            slopes = np.array(tolerances.slopes[key]) * scale
-            worst[key] = [sizes @ np.abs(part) for part in (slopes.real, slopes.imag)]
-        enlarged, much = _enlarged(np.nan_to_num(list(worst.values())).max(), analysis.mechanism.size * scale)
-        for key, z in paths.items():
-            x, y = (enlarged * part for part in worst[key])
-            axes.errorbar(z.real, z.imag, y, x, fmt="o", ms=3, capsize=4, label=key.node)
-        axes.set_title(f"points with their worst case in x and y{much}", fontsize=9)
-        axes.legend(fontsize=8)
-        return
-    parts = [z[np.isfinite(z)] for z in paths.values()]
-    width = max((abs(z - z.mean()).max() for z in parts if len(z)), default=1.0) or 1.0
-    bands = {}
-    for key, z in paths.items():
-        slopes = np.array(tolerances.slopes[key]) * scale
-        normal = 1j * _directions(z)
-        bands[key] = normal, (np.abs((slopes * normal.conj()).real) * sizes[:, None]).sum(axis=0)
-    widest = max((np.nanmax(band, initial=0.0) for _, band in bands.values()), default=0.0)
-    enlarged, much = _enlarged(widest, width)
-    for i, (key, z) in enumerate(paths.items()):
-        normal, band = bands[key]
-        good = np.isfinite(z) & np.isfinite(band)
-        outer, inner = ((z + side * enlarged * band * normal)[good] for side in (1, -1))
-        corners = np.stack([outer[:-1], outer[1:], inner[1:], inner[:-1]], axis=1)
-        light = [1 - 0.3 * (1 - part) for part in to_rgb(f"C{i}")]
-        quads = PolyCollection(
-            list(np.stack([corners.real, corners.imag], axis=-1)), facecolor=light, edgecolor=light
-        )
-        axes.add_collection(quads)
-        axes.plot(z.real, z.imag, color=f"C{i}", lw=1.2, label=key.node)
-    axes.set_title(f"paths with their worst case across{much}", fontsize=9)
-    axes.legend(fontsize=8)
-
-
-def _enlarged(widest: float, width: float) -> tuple[float, str]:
-    """Return how many times as wide a worst case is drawn to be seen in a picture so wide, and what its title says of it."""
-    # a path across which nothing moves has a band of rounding
-    if not NOISE * width < widest < SEEN * width:
-        return 1.0, ""
-    times = 10.0 ** np.ceil(np.log10(SEEN * width / widest))
-    return times, f", drawn {times:g} times as wide"
-
-
-def _directions(path: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the direction of a path at each pose; where it turns back, or has no pose, that of the poses before."""
-    along = np.gradient(path)
-    size = np.nan_to_num(np.abs(along))
-    clear = size > NOISE * size.max(initial=0.0)
-    if not clear.any():
-        return np.ones(len(path), complex)
-    before = np.maximum.accumulate(np.where(clear, np.arange(len(path)), np.argmax(clear)))
-    return np.asarray(along[before] / size[before])
-
-
-def _over_input(axes: Axes, tolerances: Tolerances, header: str) -> None:
-    """Draw a number over the input, with its worst case."""
-    base = next(c for c in tolerances.table().columns if c.header == header)
-    q = tolerances.analysis.inputs.whole.shown[:, 0]
-    values = np.array([np.nan if v is None else float(v) for v in base.values])
-    worst = tolerances.linear[header].worst
-    if len(q) == 1:
-        axes.errorbar(q, values, worst, fmt="o", ms=3, capsize=4)
-    axes.fill_between(q, values - worst, values + worst, color="C0", alpha=0.3, lw=0)
-    axes.plot(q, values, color="C0", lw=1.2)
-    axes.set_xlabel(tolerances.analysis.input_columns[0])
-    axes.set_ylabel(header)
-    axes.set_title("with its worst case", fontsize=9)
-    axes.grid(color="0.9", lw=0.6)
-
-
-def _shares(axes: Axes, tolerances: Tolerances, keys: Sequence[Quantity], of: str) -> None:
-    """Draw bars of the shares, means over the poses."""
-    variances = np.zeros(len(tolerances.limits))
-    for key in keys:
-        slopes = (
-            np.abs(np.array(tolerances.slopes[key])) * np.array(list(tolerances.limits.values()))[:, None]
-        )
-        variances += np.nansum(slopes**2, axis=1)
-    shares = variances / variances.sum() if variances.sum() > 0 else variances
-    order = np.argsort(shares, kind="stable")[-BARS:]
-    names = [list(tolerances.limits)[i].path for i in order]
-    bars = axes.barh(range(len(order)), shares[order] * 100, color="0.45")
-    axes.bar_label(bars, [f"{shares[i] * 100:.3g} %" for i in order], padding=3, fontsize=8)
-    axes.set_yticks(range(len(order)), names, fontsize=8)
-    axes.set_xlim(0, 118)
-    axes.set_xticks(range(0, 101, 20))
-    axes.set_xlabel(f"share of the {of}, %")
-    axes.set_title("shares of the dimensions", fontsize=9)
+def way(
+    analysis: Analysis,
+    shown: Sequence[Component],
+    slopes_of: Mapping[Quantity, Sequence[Any]],
+    linear: Mapping[str, Spread],
+    limits: Mapping[Dimension, float],
+) -> list[Topic]:
+    """Return the one topic: the terms at the first pose that is assembled, and their sums (`linear`)."""
+    whole = analysis.motions[0].assembled
+    if not shown or not whole.any():
+        return [
+            Topic("terms", ["None of the numbers shown varies with [tolerances]."], "Terms", {"terms": []})
+        ]
+    i = int(np.argmax(whole))
+    rows: list[tuple[str, str, float, float, float, float]] = []
+    sums: list[tuple[str, float, float]] = []
+    for each in shown:
+        slopes = [float(np.broadcast_to(each.of(slope), len(whole))[i]) for slope in slopes_of[each.key]]
+        effect = linear[each.header]
+        for (d, limit), slope, share in zip(
+            limits.items(), slopes, effect.shares[:, i].tolist(), strict=True
+        ):
+            rows.append((each.header, d.path, slope, limit, slope * limit, share))
+        sums.append((each.header, float(effect.worst[i]), float(effect.sd[i])))
+    columns = zip(*((*row[:2], *map(finite, row[2:])) for row in rows), strict=True)
+    titles = ("column", "path", "slope", "limit", "term", "share")
+    table = Table(
+        [names(title, values) for title, values in zip(titles, columns, strict=True)],
+        ("column", "path"),
+        "terms[]",
+    )
+    of_all = zip(*((header, finite(worst), finite(sd)) for header, worst, sd in sums), strict=True)
+    total = Table(
+        [names(title, values) for title, values in zip(("column", "worst", "sd"), of_all, strict=True)],
+        ("column",),
+        "sums[]",
+    )
+    at = f"At {analysis.pose_text(i)}: " if len(whole) > 1 else ""
+    text = (
+        f"{at}Δq = Σ (∂q/∂d)·δd to first order, slopes exact: worst case Σ |∂q/∂d|·limit, "
+        "standard deviation √Σ (∂q/∂d·limit/3)²; limits in SI, slopes in the column's unit per SI unit:"
+    )
+    return [Topic("terms", [text, table, "Sums:", total], "Terms of each dimension")]

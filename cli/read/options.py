@@ -1,28 +1,24 @@
-"""Option values with a unit, a bad one is wrong usage, status 2; the head of a report."""
+"""Option values with a unit: a bad one is wrong usage, status 2."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import typer
 
 from dalembert.angles import in_turn
-from dalembert.errors import DataError, toml_text
-from dalembert.hints import nearest
+from dalembert.errors import DataError
 from dalembert.units import SMALLEST, UNITS, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
     from fractions import Fraction
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from dalembert.arithmetic.doubled import Doubled
+    from dalembert.written import Steps
 
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
@@ -298,40 +294,6 @@ def time_range(flag: str, text: str) -> list[float]:
     return grid(flag, text, lambda part: number_or_quantity(flag, part, "time"), "states", "0:10:0.01")
 
 
-class Steps(NamedTuple):
-    """A range in equal steps: (first + i·each)/below for i from 0 to n − 1, each the nearest double."""
-
-    first: int
-    each: int
-    below: int
-    n: int
-
-    def at(self, i: NDArray[np.intp]) -> NDArray[np.float64]:
-        """The values at some places."""
-        import numpy as np
-
-        if self._fits:
-            # one rounding, that of the division
-            return np.asarray((self.first + i * self.each) / self.below)
-        return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
-
-    def exact(self, i: NDArray[np.intp]) -> Doubled:
-        """The values at some places in 32 digits."""
-        from fractions import Fraction
-
-        from dalembert.arithmetic.doubled import Doubled
-        from dalembert.arithmetic.doubled_operations import doubled_array
-
-        if self._fits:
-            return Doubled((self.first + i * self.each).astype(float)) / float(self.below)
-        return doubled_array([Fraction(self.first + k * self.each, self.below) for k in i.tolist()], i.shape)
-
-    @property
-    def _fits(self) -> bool:
-        """Whether doubles hold the whole numbers exactly."""
-        return max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below) < 2**53
-
-
 def steps(
     flag: str, text: str, read: Callable[[list[str]], list[float] | list[Fraction]], example: str
 ) -> Steps:
@@ -340,6 +302,8 @@ def steps(
     `read` reads the two or three; of floats the decimals that they print as count.
     """
     from fractions import Fraction
+
+    from dalembert.written import Steps
 
     count = None
     body = text
@@ -391,31 +355,11 @@ def processes(workers: int) -> Iterator[Executor | None]:
         raise DataError(str(lost)) from None
 
 
-HEAD = ("title", "machine", "customer", "date", "author")
+def refuse_long(count: int) -> None:
+    """Refuse --page of more poses than a page can hold."""
+    from dalembert.page import fits
 
-
-def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
-    """Read the table `[report]`: texts; a date may be TOML's own, or a bare year.
-
-    Raises
-    ------
-    DataError
-        No table, an unknown key, or a value that is no text.
-    """
-    from datetime import date
-
-    result = document.get("report", {})
-    if not isinstance(result, dict):
-        raise DataError(
-            f"{file}: [report]: found {toml_text(result)}, expected a table with some of {', '.join(HEAD)}"
-        )
-    for key, value in result.items():
-        if key not in HEAD:
-            raise DataError(
-                f"{file}: [report]: unknown key '{key}': expected {', '.join(HEAD)}{nearest(key, HEAD)}"
-            )
-        kinds = (str, date, int) if key == "date" else (str,)
-        if isinstance(value, bool) or not isinstance(value, kinds):
-            expected = "text in quotes, or a date" if key == "date" else "text in quotes"
-            raise DataError(f"{file}: [report] {key}: found {toml_text(value)}, expected {expected}")
-    return {key: str(value) for key, value in result.items()}
+    try:
+        fits(count)
+    except ValueError as error:
+        raise bad("--page", str(error)) from None

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from cli.read.options import bad
+from dalembert.dataclass import replace
 from dalembert.errors import DataError
 from dalembert.hints import nearest
 from dalembert.quantities import is_number, number_and_unit, parse_number, parse_quantity
 from dalembert.units import LISTED, UNITS, from_si, to_si, unit_name, written
+
+if TYPE_CHECKING:
+    from dalembert.results.result import Result
 
 SIDES = 96
 """Samples on either side of the present number: evenly spaced at first, then further and further apart."""
@@ -218,3 +222,14 @@ def _between(miss: Callable[[float], float], low: float, high: float, size: floa
     except (RuntimeError, ValueError):
         return None
     return root if abs(miss(root)) <= CLOSE * size else None
+
+
+def with_found(result: Result, solution: Found) -> Result:
+    """Return the result with the number of --find: above the table, in JSON, in addition to a table alone."""
+    notes, document, aside = result.notes, result.documented, result.aside
+    return replace(
+        result,
+        notes=lambda: "\n".join(filter(None, (notes(), f"found: {solution.text}"))),
+        document=lambda: {**document(), "found": {solution.header: solution.value}},
+        aside=lambda: [*aside(), f"found: {solution.text}"],
+    )

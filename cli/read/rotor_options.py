@@ -8,54 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing.planes import Planes
 from cli.read.options import bad, needed, quantity, refuse, two_bearings
 from dalembert.dataclass import dataclass, replace
-from dalembert.errors import DataError, quote
 from dalembert.quantities import parse_quantity
 from dalembert.results.columns import Table, names, number
-from dalembert.tables.table import read
 from dalembert.units import SMALLEST, from_si, to_si, written
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Planes:
-    """Correction planes, in SI; `rotor` names each plane's rotor where they differ from rotor to rotor."""
-
-    name: list[str]
-    z: NDArray[np.float64] | None
-    radius: NDArray[np.float64]
-    z_unit: str
-    radius_unit: str
-    file: str = "--plane"
-    rotor: list[str] | None = None
-
-    @property
-    def several(self) -> bool:
-        """Whether any rotor has more than one plane: then the axial positions count."""
-        owners = self.rotor or ["" for _ in self.name]
-        return len(set(owners)) < len(owners)
-
-    def rows(self, rotors: Sequence[str], table: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return for each rotor the number of its first plane and how many it has.
-
-        Raises DataError where a rotor has no plane, or a plane's rotor is not in the table.
-        """
-        if self.rotor is None:
-            return np.zeros(len(rotors), dtype=np.intp), np.full(len(rotors), len(self.name))
-        count: dict[str, int] = {}
-        for owner in self.rotor:
-            count[owner] = count.get(owner, 0) + 1
-        if strange := count.keys() - set(rotors):
-            raise DataError(f"{self.file}: planes for rotor {quote(min(strange))}, which {table} lacks")
-        start = dict(zip(count, np.cumsum([0, *count.values()]).tolist(), strict=False))
-        for rotor in rotors:
-            if rotor not in count:
-                raise DataError(
-                    f"{self.file}: no plane for rotor {quote(rotor)} of {table}: expected at least one"
-                )
-        return np.array([start[r] for r in rotors], dtype=np.intp), np.array(
-            [count[r] for r in rotors], dtype=np.intp
-        )
 
 
 def from_options(specs: Sequence[str], flag: str = "--plane", *, sought: bool = False) -> Planes:
@@ -94,67 +52,9 @@ def from_options(specs: Sequence[str], flag: str = "--plane", *, sought: bool = 
         next((unit for _, unit in radii if unit), "mm"),
         flag,
     )
-    if (pair := _together(planes, range(len(names)))) is not None:
-        raise bad(flag, _same_place(planes, *pair))
+    if two := planes.same_place(range(len(names))):
+        raise bad(flag, two)
     return planes
-
-
-def from_table(path: str) -> Planes:
-    """Read a table with the columns plane, radius_* and, but for single planes, z_*; rotor where they differ."""
-    needed = [("plane",), ("radius",)]
-    table = read(path, numbers={"z": "length", "radius": "length"}, texts=["plane", "rotor"], needed=needed)
-    names, rotor = table.needed("plane"), table.texts.get("rotor")
-    radius = table.require("radius", "length")
-    table.reject(~(radius.values >= SMALLEST), "radius", "a positive radius")
-    owners = rotor or [""] * len(names)
-    seen: set[tuple[str, str]] = set()
-    for index, named in enumerate(zip(owners, names, strict=True)):
-        if named in seen:
-            of = f" for rotor {quote(named[0])}" if rotor else ""
-            raise table.error(index, "plane", names[index], f"each plane once{of}")
-        seen.add(named)
-    if len(set(owners)) < len(owners):
-        table.require("z", "length")
-    z = table.numbers.get("z")
-    # the planes of a rotor stand together, rotors in the order in which they first stand
-    order = np.argsort(table.numbered("rotor")[1], kind="stable").tolist()
-    planes = Planes(
-        [names[i] for i in order],
-        z.si[order] if z else None,
-        radius.si[order],
-        z.unit if z else "",
-        radius.unit,
-        table.file,
-        [owners[i] for i in order] if rotor else None,
-    )
-    start = 0
-    for stop in range(1, len(names) + 1):
-        if stop == len(names) or (planes.rotor and planes.rotor[stop] != planes.rotor[start]):
-            if (pair := _together(planes, range(start, stop))) is not None:
-                raise DataError(f"{table.file}: {_same_place(planes, *pair)}")
-            start = stop
-    return planes
-
-
-def _together(planes: Planes, among: range) -> tuple[int, int] | None:
-    """Return two planes at one place, if there are."""
-    if planes.z is None:
-        return None
-    seen: dict[float, int] = {}
-    for index in among:
-        other = seen.setdefault(float(planes.z[index]), index)
-        if other != index:
-            return other, index
-    return None
-
-
-def _same_place(planes: Planes, one: int, other: int) -> str:
-    of = f" of rotor {quote(planes.rotor[one])}" if planes.rotor else ""
-    assert planes.z is not None
-    return (
-        f"the planes {planes.name[one]} and {planes.name[other]}{of} lie at the same place, z = {planes.z[one]:g} m: "
-        "together they cannot correct a couple; expected different places"
-    )
 
 
 # -- tolerance ----------------------------------------------------------------------------------------------

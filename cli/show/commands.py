@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
 
-from cli.read.options import HEAD, column_names
+from cli.read.options import bad, column_names
+from dalembert.results.about import HEAD
 
 if TYPE_CHECKING:
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
 
 SHARED = """
@@ -115,6 +116,16 @@ class ShowOptions(SimpleNamespace):
                 raise typer.BadParameter(f"'{text}': expected one of {keys} and a text", param_hint="--about")
             result[key.strip()] = value.strip()
         return result
+
+    @cached_property
+    def chosen_units(self) -> dict[str, str] | None:
+        """The units of --units: dimension -> unit."""
+        from dalembert.results.chosen_units import chosen_units
+
+        try:
+            return None if self.units is None else chosen_units(self.units)
+        except ValueError as error:
+            raise bad("--units", error) from None
 
     @property
     def form(self) -> str:

@@ -17,13 +17,14 @@ import typer
 
 from cli import function_of
 from cli.show.commands import Declared, ShowOptions, with_options
-from cli.show.terminal import coloured
 from dalembert.errors import DataError, one_line
+from dalembert.results.about import HEAD
+from dalembert.terminal import coloured
 
 if TYPE_CHECKING:
-    from cli.show.expect import Comparison
-    from cli.show.result import Result
     from dalembert.results.columns import Table
+    from dalembert.results.expect import Comparison
+    from dalembert.results.result import Result
 
     Made = Callable[[], bytes | Iterable[bytes]]
 
@@ -66,12 +67,12 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
         return
     if options.steps:
         result = _with_way(result)
-    result = _in_chosen_units(result, options.units)
+    result = _in_chosen_units(result, options.chosen_units)
     whole = cache(_first(result))
     result = _with_first(result, whole)
     checked = None
     if options.expect is not None:
-        from cli.show.expect import compare
+        from dalembert.results.expect import compare
 
         _, *others = result.tables.values()
         screen = () if result.screen is None else result.screen()
@@ -99,7 +100,8 @@ def show(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
 
 def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> None:
     """Write the files; where one of them is an input, none."""
-    from cli.show.files import check_folders, refuse_inputs, write_all
+    from cli.show.files import check_folders, refuse_inputs
+    from dalembert.results.files import write_all
 
     output = options.output
     if options.digits and options.form != ".json":
@@ -114,7 +116,7 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     check_folders(names)
     files |= {**result.beside, **pages}
     if options.plot is not None and result.figure is not None:
-        from cli.show.picture import drawn
+        from dalembert.drawing.sheet import drawn
 
         figure = result.plotted or result.figure
         files[options.plot] = partial(drawn, figure, options.plot.suffix.lower()[1:])
@@ -158,9 +160,9 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
     elif options.output is None:
         sys.stdout.write(csv_text(_first(result)().cells))
     if options.steps and not options.json and options.form != ".json":
-        from cli.show.result import way_text
+        from dalembert.results.result import way_text
 
-        sys.stdout.write(way_text(result, options.units, sys.stdout.isatty()))
+        sys.stdout.write(way_text(result, options.chosen_units, sys.stdout.isatty()))
     sys.stdout.flush()
     if checked is not None or options.output is not None or not sys.stdout.isatty():
         _note(result, options)
@@ -203,7 +205,7 @@ ROWS = 24  # rows of a further table that a terminal shows
 
 def _tables_text(result: Result, width: int | None) -> Iterator[str]:
     """Yield the tables as the terminal shows them: the first whole, of the others the first rows."""
-    from cli.show.result import table_block
+    from dalembert.results.result import table_block
     from dalembert.results.text import as_list, heading
 
     first, *others = result.tables.items()
@@ -239,7 +241,8 @@ def reported(options: str) -> Callable[[Callable[[SimpleNamespace, ShowOptions],
 
 
 def _hand_on(result: Result, options: ShowOptions, call: Mapping[str, str]) -> None:
-    from cli.show.files import refuse_inputs, write_all
+    from cli.show.files import refuse_inputs
+    from dalembert.results.files import write_all
 
     files = [*result.beside.items(), *_report(result, options, call).items()]
     refuse_inputs(path for path, _ in files)
@@ -255,28 +258,39 @@ def _report(
     """Return the files that --report writes."""
     if options.report is None:
         return {}
-    from cli.show.report import pages
+    from datetime import date
 
-    files = pages(result, options, call, checked)
+    from dalembert.results.report import pages, report
+
+    # what the options say of its head goes before what the file itself says
+    about = {"date": date.today().isoformat(), **result.about, **options.head}
+    made = report(
+        result,
+        {key: about[key] for key in HEAD if about.get(key)},
+        units=options.chosen_units,
+        digits=options.digits,
+        options=call,
+        words=sys.argv[1:],
+        checked=checked,
+    )
+    files = pages(options.report, made)
     return {path: partial(bytes, page) for path, page in files.items()}
 
 
-def _in_chosen_units(result: Result, units: str | None) -> Result:
+def _in_chosen_units(result: Result, units: Mapping[str, str] | None) -> Result:
     """Return the result with its tables in the units that --units names."""
     if units is None:
         return result
-    from cli.show.result import chosen_units, in_units
-
-    chosen = chosen_units(units)
+    from dalembert.results.chosen_units import in_units
 
     def of(table: Callable[[], Table]) -> Callable[[], Table]:
-        return lambda: in_units(table(), chosen)
+        return lambda: in_units(table(), units)
 
     screen = result.screen
     return replace(
         result,
         tables={name: of(table) for name, table in result.tables.items()},
-        screen=None if screen is None else lambda: [in_units(table, chosen) for table in screen()],
+        screen=None if screen is None else lambda: [in_units(table, units) for table in screen()],
         expected=[of(table) for table in result.expected],
     )
 
@@ -294,10 +308,10 @@ def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
     every = ((name.strip("-"), table()) for name, table in result.tables.items())
     formed = {name: table for name, table in every if table.columns}
     if form == ".xlsx":
-        from cli.show.files import workbook
+        from dalembert.results.files import workbook
 
         return workbook({name: [table] for name, table in formed.items()})
-    from cli.show.files import handed_on
+    from dalembert.results.files import handed_on
 
     return handed_on(form, formed, result.warnings)
 
@@ -305,7 +319,7 @@ def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
 def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterable[bytes]:
     """Return a file of a single table."""
     if form == ".parquet":
-        from cli.show.files import parquet
+        from dalembert.results.files import parquet
 
         return parquet([table()])
     from dalembert.results.text import csv_text

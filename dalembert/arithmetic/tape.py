@@ -8,9 +8,9 @@ kind of number: floats, arrays, recorded numbers, many digits.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Container, Iterable, Mapping, Sequence
 from functools import cached_property, reduce
-from operator import or_
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -47,6 +47,10 @@ DOUBLED = {
 }
 """Further kinds, on the tape of a tape in doubled numbers (`engines.doubled`)."""
 
+OWN = {name: getattr(operator, name) for name in ("add", "sub", "mul", "neg", "abs")} | {
+    "div": operator.truediv
+}
+"""The kinds that are operations of the numbers themselves; the others are functions of a `Kind`."""
 EMPTY: Mapping[Any, Any] = MappingProxyType({})
 
 
@@ -160,7 +164,7 @@ class Tape:
             if kind == "input":
                 levels.append(on[arguments[0]])
             else:
-                levels.append(0 if kind == "const" else reduce(or_, (levels[a] for a in arguments)))
+                levels.append(0 if kind == "const" else reduce(operator.or_, (levels[a] for a in arguments)))
         return levels
 
     def on(self, inputs: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
@@ -183,21 +187,7 @@ class Tape:
 
 def performed(name: str, values: list[Any], kind: Kind) -> Any:
     """One operation on numbers of a kind."""
-    match name:
-        case "add":
-            return values[0] + values[1]
-        case "sub":
-            return values[0] - values[1]
-        case "mul":
-            return values[0] * values[1]
-        case "div":
-            return values[0] / values[1]
-        case "neg":
-            return -values[0]
-        case "abs":
-            return abs(values[0])
-        case _:
-            return getattr(kind, name)(*values)
+    return (OWN.get(name) or getattr(kind, name))(*values)
 
 
 def reached(

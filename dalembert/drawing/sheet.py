@@ -1,12 +1,16 @@
-"""The sheet that a picture is drawn on, and axes that print their numbers plainly."""
+"""The sheet that a picture is drawn on, axes that print their numbers plainly, and the bytes of its file."""
 
 from __future__ import annotations
 
+import io
+from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+from dalembert.errors import needs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
+    from matplotlib.figure import Figure, FigureBase
 
 
 def sheet(width: float, height: float, figure: FigureBase | None = None) -> FigureBase:
@@ -67,3 +71,25 @@ def empty(axes: Axes, why: str, which: str = "xy") -> None:
     for name in which:
         getattr(axes, f"set_{name}ticks")([])
     axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", va="center", color="0.3", fontsize=9)
+
+
+def blank() -> Figure:
+    """Return an empty figure, which takes the size that its picture needs."""
+    from matplotlib.figure import Figure
+
+    return Figure()
+
+
+def drawn(draw: Callable[[], Figure], suffix: str) -> bytes:
+    """Return a picture as a file of this kind holds it."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise needs("--plot", "matplotlib", "plot") from None
+    matplotlib.use("Agg")
+    matplotlib.rcParams["svg.hashsalt"] = "dalembert"  # the same picture is the same file
+    matplotlib.rcParams["text.parse_math"] = False  # names are names, with $ too
+    stream = io.BytesIO()
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix)
+    draw().savefig(stream, format=suffix, dpi=150, metadata=metadata)
+    return stream.getvalue()

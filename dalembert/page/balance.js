@@ -29,6 +29,8 @@ function shapesAt(z) {
 const along = sheet.modes && [sheet.modes.stations[0], sheet.modes.stations.at(-1)];
 const rulesOf = (name) => ({ positive: name !== "angle" && name !== "z", within: name === "z" ? along : null });
 
+refusedRows = () => sheet.rotors.flatMap((rotor, r) => sheet.rows[r].map((row) => [values[cellName(rotor, row, sheet.amount)], cellName(rotor, row, "radius")])).filter(([amount, radius]) => amount > 0 && values[radius] === 0).map(([, radius]) => TEXTS.noRadius(radius));
+
 solveSheet = () => {
   polygons = [];
   for (const [r, rotor] of sheet.rotors.entries()) {
@@ -174,11 +176,11 @@ drawSheet = () => {
     );
   }
   const drawn = put(host, "div", { class: "polygons" });
-  if (!wrong.size) for (const [name, vectors, closing] of polygons.slice(0, 8)) polygon(drawn, TEXTS.polygon(name), vectors, closing, TEXTS.correction);
+  if (answers.size) for (const [name, vectors, closing] of polygons.slice(0, 8)) polygon(drawn, TEXTS.polygon(name), vectors, closing, TEXTS.correction);
 };
 
 function csv() {
-  if (wrong.size) return "";
+  if (!answers.size) return "";
   const several = sheet.rotors.length > 1;
   const lines = [[...(several ? ["rotor"] : []), "name", ...sheet.columns.map((c) => c.header)].join(",")];
   for (const [r, rotor] of sheet.rotors.entries()) {
@@ -200,7 +202,7 @@ window.dalembert = {
     }
     asOne(() => Object.entries(changed).forEach(([name, x]) => check(name, x, String(x), inputs.get(name).rules)));
     update();
-    return !wrong.size;
+    return answers.size > 0;
   },
   get: (name) => (settable().includes(name) ? (wrong.has(name) ? NaN : values[name]) : answer(name)),
   curve: () => [],

@@ -248,7 +248,7 @@ function csv() {
     const on = k ? (standing[k] ?? sheet.planes.map(() => [0, 0])) : null;
     for (const [s, [sensor, speed]] of sheet.channels.entries()) {
       if (!has(reading(k, s, "amplitude"))) continue;
-      const masses = on ? [sheet.planes.join(";"), on.map(([size]) => inUnit(size, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "deg")).join(";")] : ["", "", ""];
+      const masses = on ? [quoted(sheet.planes.join(";")), on.map(([size]) => inUnit(size, sheet.mass.unit)).join(";"), on.map(([, angle]) => inUnit(whole(angle), "deg")).join(";")] : ["", "", ""];
       lines.push([quoted(run), quoted(sensor), ...(speeds ? [String(speed ?? "")] : []), String(values[reading(k, s, "amplitude")]), inUnit(values[reading(k, s, "phase")], "deg"), ...masses].join(","));
     }
   }

@@ -63,6 +63,7 @@ function room() {
   return left <= right ? [left, right, low, high] : [-1, 1, -1, 1];
 }
 let [left, right, low, high] = room();
+const [MARGIN, RIM] = [34, 6]; // pixels around the shapes, and around the tips of arrows
 const LEAST = { pin: 3.5, tip: 2.5, mass: 3 }; // pixels
 let scale, px, py, width, height;
 
@@ -79,7 +80,7 @@ const figures = data.series.map((series, s) => {
 const words = texts(layers.over);
 const missing = put(layers.over, "text", { class: "missing" }, TEXTS.open);
 const bar = put(layers.over, "path", { class: "scale" });
-const drawn = { names: true, velocity: false, acceleration: false, forces: whole.forces.length > 0, centres: false, polygon: false };
+const drawn = { names: true, velocity: false, acceleration: false, force: whole.forces.length > 0, centres: false, polygon: false };
 const traced = new Set(whole.points.filter((p) => p.trace).map((p) => p.name));
 
 function drawFigure(figure, i) {
@@ -126,13 +127,15 @@ function arrows(kind, tails) {
   };
   measure();
   measures.push(measure);
-  return (i, on) => {
+  // at a pose: where the arrows begin, in m, and what they are, in pixels, all with y downwards
+  const vectors = (i) => {
     const length = (0.2 * Math.min(width, height)) / (Math.max(usual, longest[kind] / 2.5) || 1);
-    for (const [k, [point, x, y]] of tails.entries()) {
-      const d = on ? arrow(px(at(whole, point.x, i)), py(at(whole, point.y, i)), length * at(whole, x, i), -length * at(whole, y, i)) : "";
-      parts[k].setAttribute("d", d);
-    }
+    return tails.map(([point, x, y]) => [at(whole, point.x, i), -at(whole, point.y, i), length * at(whole, x, i), -length * at(whole, y, i)]);
   };
+  const draw = (i) => vectors(i).forEach(([x, y, u, v], k) => parts[k].setAttribute("d", drawn[kind] ? arrow(px(x), py(-y), u, v) : ""));
+  // those that the margin may not hold, over all poses
+  const wide = () => (drawn[kind] ? Array.from({ length: n }, (_, i) => vectors(i)).flat() : []).filter(([x, y, u, v]) => Number.isFinite(x + y) && Math.hypot(u, v) > MARGIN - RIM);
+  return { draw, wide };
 }
 const rates = (key) => movers.filter((p) => p[key]).map((p) => [p, ...p[key]]);
 const drawers = {
@@ -316,7 +319,7 @@ function legend() {
   const of = (kind, unit) => longest[kind] && lines.push(TEXTS.longest(TEXTS.arrows[kind], `${short(longest[kind])} ${unit}`));
   if (drawn.velocity) of("velocity", data.units.v);
   if (drawn.acceleration) of("acceleration", data.units.a);
-  if (drawn.forces) of("force", data.units.f);
+  if (drawn.force) of("force", data.units.f);
   if (drawn.polygon) lines.push(TEXTS.ofPolygon(data.units.v));
   $("legend").textContent = lines.join("; ");
 }
@@ -327,7 +330,7 @@ function drawAll(i) {
   words.take(barAt[0], barAt[1], barAt[2], 12);
   drawHandles?.(stands);
   labels(stands, i);
-  for (const [kind, draw] of Object.entries(drawers)) draw(i, drawn[kind === "force" ? "forces" : kind]);
+  for (const { draw } of Object.values(drawers)) draw(i);
   drawCentres(i);
   words.put(barAt[0], barAt[1] - 6, barAt[3], "note");
   words.done();
@@ -342,13 +345,21 @@ let drawHandles; // of a page that computes
 let barAt; // its middle, half its length, its words
 function resize() {
   width = Math.max(240, view.clientWidth);
-  const margin = 34;
   const shape = (high - low || right - left || 1) / (right - left || high - low || 1);
-  height = Math.round(Math.max(0.4 * width, Math.min(shape * (width - 2 * margin) + 2 * margin, Math.max(300, 0.68 * innerHeight), 1.2 * width)));
+  height = Math.round(Math.max(0.4 * width, Math.min(shape * (width - 2 * MARGIN) + 2 * MARGIN, Math.max(300, 0.68 * innerHeight), 1.2 * width)));
   sized(svg, width, height);
-  scale = Math.min((width - 2 * margin) / (right - left || 1e-300), (height - 2 * margin) / (high - low || 1e-300));
-  px = (x) => width / 2 + scale * (x - (left + right) / 2);
-  py = (y) => height / 2 - scale * (y - (low + high) / 2);
+  scale = Math.min((width - 2 * MARGIN) / (right - left || 1e-300), (height - 2 * MARGIN) / (high - low || 1e-300));
+  // the shapes make room for long arrows, at most by half
+  const tips = Object.values(drawers).flatMap(({ wide }) => wide());
+  const spanOf = (from, to, axis) => tips.reduce(([least, most], one) => {
+    const tip = scale * one[axis] + one[axis + 2];
+    return [Math.min(least, tip - RIM), Math.max(most, tip + RIM)];
+  }, [scale * from - MARGIN, scale * to + MARGIN]);
+  const spans = () => [spanOf(left, right, 0), spanOf(-high, -low, 1)];
+  for (let round = 0; round < 14 && spans().some(([least, most], axis) => most - least > [width, height][axis] + 0.01); round++) scale *= 0.95;
+  const [u, v] = spans().map(([least, most]) => (least + most) / 2);
+  px = (x) => width / 2 + scale * x - u;
+  py = (y) => height / 2 - scale * y - v;
   sizeCircles();
   missing.setAttribute("x", width / 2);
   missing.setAttribute("y", 20);
@@ -381,9 +392,9 @@ const flips = (name, then) => (on) => {
   legend();
 };
 toggle("n", TEXTS.names, drawn.names, flips("names"));
-toggle("v", TEXTS.velocities, false, flips("velocity"), longest.velocity > 0);
-toggle("a", TEXTS.accelerations, false, flips("acceleration"), longest.acceleration > 0);
-if (whole.forces.length) toggle("f", TEXTS.forces, drawn.forces, flips("forces"), longest.force > 0);
+toggle("v", TEXTS.velocities, false, flips("velocity", fit), longest.velocity > 0);
+toggle("a", TEXTS.accelerations, false, flips("acceleration", fit), longest.acceleration > 0);
+if (whole.forces.length) toggle("f", TEXTS.forces, drawn.force, flips("force", fit), longest.force > 0);
 toggle("i", TEXTS.centres, false, flips("centres", centreTable), velocities && longest.velocity > 0);
 toggle("p", TEXTS.velocityPolygon, false, flips("polygon", polygonOn), velocities && longest.velocity > 0);
 legend();

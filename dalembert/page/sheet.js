@@ -4,6 +4,7 @@ let values = { ...sheet.values }; // SI and radians, amplitudes as the file has 
 const own = { ...sheet.values };
 let answers = new Map(); // name -> [number, how far a second computation with 32 digits is from it]
 let solveSheet, drawSheet; // of the kind of sheet
+let refusedRows = () => []; // likewise: what rows lack that the program would refuse
 const inputs = new Map(); // name -> {input, unit, into, rules, kind}
 
 const snapshot = () => structuredClone({ values, rows: sheet.rows });
@@ -48,8 +49,9 @@ function listCells() {
 function update() {
   answers = new Map();
   copied("");
-  if (!wrong.size) solveSheet();
-  say([...wrong.values()].join("; "));
+  const refused = wrong.size ? [...wrong.values()] : refusedRows();
+  if (!refused.length) solveSheet();
+  say(refused.join("; "));
   drawSheet();
   listCells();
 }

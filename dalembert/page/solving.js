@@ -196,14 +196,6 @@ function tabled({ at, periodic, turns }, values, places) {
   return places.map((place) => {
     if (turns) place = within(place, TAU);
     if (periodic) place = within(place, end - first);
-    if (!(place >= first && place <= end)) return NaN;
-    let [low, high] = [0, at.length - 1];
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (at[middle] <= place) low = middle;
-      else high = middle;
-    }
-    if (place === end) return values.at(-1);
-    return ((values[high] - values[low]) / (at[high] - at[low])) * (place - at[low]) + values[low];
+    return place >= first && place <= end ? interpolated(at, values, place) : NaN;
   });
 }

@@ -73,6 +73,7 @@ const TEXTS = {
   wrong: (name, text, unit) => `${name}: found "${text}", expected a number${unit ? ` such as "${unit}"` : ""}`,
   large: (name, text, most) => `${name}: found "${text}", expected a number of at most ${most}`,
   negative: (name, text) => `${name}: found "${text}", expected a number that is not negative`,
+  noRadius: (name) => `${name}: found 0, expected a positive radius, for there is a mass`,
   outside: (name, text, low, high) => `${name}: found "${text}", expected a place between ${low} and ${high}, where the mode shapes are known`,
   unknown: (name) => `nothing is named "${name}"`,
   impossible: "these numbers make no mechanism: two points of a joint coincide, or a mass is negative",

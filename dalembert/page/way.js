@@ -16,13 +16,14 @@ const principal = (angle) => angle - TAU * Math.ceil((angle - Math.PI - 1e-9) / 
 // values at nodes, linear between them; before the first and after the last as there
 function interpolated(nodes, values, at) {
   let [low, high] = [0, nodes.length - 1];
+  if (at <= nodes[low]) return values[low];
+  if (at >= nodes[high]) return values[high];
   while (high - low > 1) {
     const middle = (low + high) >> 1;
     if (nodes[middle] <= at) low = middle;
     else high = middle;
   }
-  const share = low === high ? 0 : Math.min(Math.max((at - nodes[low]) / (nodes[high] - nodes[low]), 0), 1);
-  return values[low] + (values[high] - values[low]) * share;
+  return ((values[high] - values[low]) / (nodes[high] - nodes[low])) * (at - nodes[low]) + values[low];
 }
 
 class Way {

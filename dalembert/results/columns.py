@@ -11,7 +11,6 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from dalembert.dataclass import dataclass, field
-from dalembert.decimals import short
 from dalembert.units import LISTED, RESULTS, UNITS, from_si, to_si
 
 if TYPE_CHECKING:
@@ -104,8 +103,6 @@ def number(
     error: Callable[[], ArrayLike] | None = None,
     place: Place = "",
     exact: Callable[[], Doubled] | None = None,
-    *,
-    shortened: bool = False,
 ) -> Column:
     """A quantity, shown in a unit.
 
@@ -125,17 +122,12 @@ def number(
         Where it stands in a row of the JSON document, without its unit; by default under its name, None: not in JSON.
     exact
         The numbers in 32 digits: the error of a shown number is its difference from them.
-    shortened
-        Whether a number that is a short decimal of its unit but for a few roundings is that decimal (`decimals.short`).
 
     Examples
     --------
     >>> column = number("radius", "length", [0.02], "mm")
     >>> column.header, column.values.tolist(), column.place, column.documented
     ('radius_mm', [20.0], 'radius_m', [0.02])
-    >>> column = number("mass", "mass", [1e-6 / 0.02], "g", shortened=True)
-    >>> 1e-6 / 0.02, column.values.tolist(), column.documented
-    (4.9999999999999996e-05, [0.05], [5e-05])
     """
     import numpy as np
 
@@ -154,19 +146,10 @@ def number(
             return values
         return from_si(to_si(values, dimension, own), dimension, unit)
 
-    errors, cells = None if error is None else lambda: shown(error()), shown(array)
-    if shortened:
-        full, cells = cells, short(cells)
-        array = np.where(cells == full, array, _documented(cells, dimension, unit))
+    errors = None if error is None else lambda: shown(error())
     if exact is not None:
-        errors = apart(cells, dimension, unit, exact)
-    return Column(name, unit, cells, errors, key, array)
-
-
-def _documented(values: NDArray[np.float64], dimension: str, unit: str) -> NDArray[np.float64]:
-    """Return numbers of a unit as JSON has them."""
-    own = document_unit(dimension)
-    return values if unit == own else from_si(to_si(values, dimension, unit), dimension, own)
+        errors = apart(shown(array), dimension, unit, exact)
+    return Column(name, unit, shown(array), errors, key, array)
 
 
 def apart(
@@ -189,9 +172,8 @@ def apart(
 
 
 def computed(
-    subject: Any, name: str, dimension: str, of: Callable[[Any], Any], unit: str = "", place: Place = "",
-    *, shortened: bool = False,
-) -> Column:  # fmt: skip
+    subject: Any, name: str, dimension: str, of: Callable[[Any], Any], unit: str = "", place: Place = ""
+) -> Column:
     """A quantity that is computed twice: `of` a subject, and of its `second`, the same in 32 digits."""
     import numpy as np
 
@@ -199,8 +181,7 @@ def computed(
         again: Any = np.atleast_1d(of(subject.second))
         return again.doubled  # type: ignore[no-any-return]
 
-    values = np.atleast_1d(of(subject))
-    return number(name, dimension, values, unit, place=place, exact=exact, shortened=shortened)
+    return number(name, dimension, np.atleast_1d(of(subject)), unit, place=place, exact=exact)
 
 
 def vector(
@@ -242,7 +223,8 @@ def read_number(name: str, dimension: str, values: ArrayLike, unit: str) -> Colu
 
     own, array = document_unit(dimension), np.asarray(values, dtype=float)
     key = f"{name}_{own}".rstrip("_")
-    return Column(name, unit, array, None, key, _documented(array, dimension, unit))
+    stored = array if unit == own else from_si(to_si(array, dimension, unit), dimension, own)
+    return Column(name, unit, array, None, key, stored)
 
 
 @dataclass(eq=False, repr=False)

@@ -63,22 +63,31 @@ def printed(name: str, column: Values) -> list[str]:
 
 
 NOISE = 1e-12
-"""Of the largest number of a column: what is smaller is what rounding left of 0."""
+"""Of the largest number of a column, or of a vector's components: what is smaller is what rounding left of 0."""
 
 
-def without_noise(values: Values, unit: str) -> Values:
-    """Return the values of a column as people read them: what rounding left of 0 is 0.
+def without_noise(columns: Sequence[Column]) -> list[Values]:
+    """Return the values of columns as people read them: what rounding left of 0 is 0.
 
-    Numbers without a unit may be of several quantities, which say nothing of each other.
+    Components x, y and z of one vector have one size. Numbers without a unit may be of several quantities, which say nothing of
+    each other.
 
-    >>> without_noise([0.04, 2.4e-18, None], "m"), without_noise([2.4e-18], "m"), without_noise([4.0, 2.4e-18], "")
-    ([0.04, 0.0, None], [2.4e-18], [4.0, 2.4e-18])
+    >>> without_noise([Column("x", "m", [0.04, 2.4e-18, None]), Column("y", "m", [2.4e-18] * 3)])
+    [[0.04, 0.0, None], [0.0, 0.0, 0.0]]
+    >>> without_noise([Column("x", "m", [0.04]), Column("error", "m", [2.4e-18]), Column("ratio", "", [4.0, 2.4e-18])])
+    [[0.04], [2.4e-18], [4.0, 2.4e-18]]
     """
-    if not unit:
-        return values
-    sizes = [abs(v) for v in values if isinstance(v, float) and isfinite(v)]
-    floor = NOISE * max(sizes, default=0.0)
-    return [0.0 if isinstance(v, float) and abs(v) < floor else v for v in values]
+    largest: dict[tuple[str, str], float] = {}
+    keys = [(c.name[:-1] if c.name.endswith(("x", "y", "z")) else c.name, c.unit) for c in columns]
+    for key, column in zip(keys, columns, strict=True):
+        sizes = (abs(v) for v in column.values if isinstance(v, float) and isfinite(v))
+        largest[key] = max(largest.get(key, 0.0), max(sizes, default=0.0))
+    return [
+        [0.0 if isinstance(v, float) and abs(v) < NOISE * largest[key] else v for v in column.values]
+        if column.unit
+        else column.values
+        for key, column in zip(keys, columns, strict=True)
+    ]
 
 
 def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: int | None = None) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dalembert.dataclass import dataclass, field
 from dalembert.results.columns import Table, document
+from dalembert.results.text import NOISE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,9 +74,10 @@ def figures(value: float) -> str:
 
 
 def vector_text(z: complex) -> str:
-    """Return a vector of the plane as it stands in an equation: `(300, 200)`.
+    """Return a vector of the plane as it stands in an equation: `(300, 200)`; what rounding left of 0 is 0.
 
-    >>> vector_text(300 - 200j)
-    '(300, −200)'
+    >>> vector_text(300 - 200j), vector_text(1e-13 - 200j)
+    ('(300, −200)', '(0, −200)')
     """
-    return f"({figures(z.real)}, {figures(z.imag)})"
+    parts = (0.0 if abs(part) < NOISE * abs(z) else part for part in (z.real, z.imag))
+    return f"({', '.join(map(figures, parts))})"

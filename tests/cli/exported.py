@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cli.formats.export_command import file_bytes
 from tests.four_bars import body, four_bar
 from virtualwork import Mechanism
+from virtualwork.exchange.export import file_bytes
 
 EXAMPLES = Path(__file__).parents[2] / "cli" / "examples"
 FOUR_BAR = four_bar(

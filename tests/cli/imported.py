@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from cli.formats import read
-from cli.formats.description import described
-from cli.formats.settled import settle
 from virtualwork import Mechanism
+from virtualwork.exchange.description import described
+from virtualwork.exchange.settled import settle
 
 FORMATS = Path(__file__).parents[1] / "data" / "formats"
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from cli.formats import read
-from cli.formats.description import described
-from cli.formats.settled import settle
 from dalembert.errors import DataError
 from virtualwork import Mechanism
+from virtualwork.exchange.description import described
+from virtualwork.exchange.settled import settle
 
 
 def taken(text: str, folder: Path | None = None) -> tuple[Mechanism, list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cli.cases.inputs import Axis, Varied
-from cli.read.written import ROWS
+from dalembert.written import ROWS
 
 
 def rows(names: Sequence[Varied], shown: ArrayLike) -> NDArray[Any]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.body.inertias import Check, checks
-from cli.formats import read_robot
+from rigidbody3d.robots.inertias import InertiaCheck, check_robot_inertias
+from rigidbody3d.robots.reading import read as read_robot
 from tests.conftest import Dalembert
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -25,8 +25,8 @@ def link(entries: str, mass: str = "1", more: str = "", at: str = "0 0 0") -> st
     )
 
 
-def only(text: str) -> Check:
-    (found,) = checks(read_robot("file", text.encode(), None))
+def only(text: str) -> InertiaCheck:
+    (found,) = check_robot_inertias(read_robot("file", text.encode(), None))
     return found
 
 

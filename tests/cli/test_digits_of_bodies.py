@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.rotation import period_of, taylor
-from cli.spin.rotation import Rotation, read_body
-from cli.spin.tables import constants
+from cli.body.states import constants
 from dalembert.tables.exact import LONG, as_written
 from dalembert.tables.table import Numbers
+from rigidbody3d.rotation_in_time import Rotation
+from rigidbody3d.turning_body import read_body
 
 F = Fraction
 

@@ -10,9 +10,9 @@ import typer
 
 from cli import COMMANDS
 from cli.app import build
-from cli.read.options import HEAD
-from cli.spin.rotation import KEYS
+from dalembert.results.about import HEAD
 from dalembert.units import UNITS
+from rigidbody3d.turning_body import KEYS
 from virtualwork.describe.description import FILE
 from virtualwork.describe.description import UNITS as OF_FILE
 from virtualwork.describe.keys import table_keys

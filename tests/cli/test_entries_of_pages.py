@@ -219,3 +219,47 @@ def test_words_of_pictures_keep_apart(dalembert: Dalembert, tmp_path: Path, brow
                     assert page.names_in_one_place() == []
         finally:
             browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [360, 1280])
+def test_arrows_end_in_the_picture(width: int, dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """The tip of the largest force of a press lay 145 pixels below the picture, that of Jansen's acceleration 71 beside it."""
+    press = ("--over", "0deg:360deg:1deg", "--page", "press.html")
+    assert dalembert("forces", EXAMPLES / "crank-press" / "press.toml", *press).returncode == 0
+    leg = ("--over", "0deg:360deg:10deg", "--page", "leg.html")
+    assert dalembert("mechanism", EXAMPLES / "jansen" / "jansen.toml", *leg).returncode == 0
+    browser.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": 740, "deviceScaleFactor": 1, "mobile": False},
+    )
+    try:
+        for file, keys, poses, kinds in (
+            ("press", "v", range(0, 361, 4), {"force", "velocity"}),
+            ("leg", "va", range(37), {"acceleration", "velocity"}),
+        ):
+            page = Computing(browser, tmp_path / f"{file}.html")
+            alone = page("return scale")
+            for key in keys:
+                page.press(key)
+            tips, seen, size = page(
+                "const tips = [], seen = new Set();"
+                "for (const i of arguments[0]) { drawAll(i);"
+                " for (const e of svg.querySelectorAll('path.velocity, path.acceleration, path.force')) {"
+                "  const d = e.getAttribute('d'); if (!d) continue;"
+                "  seen.add(e.getAttribute('class')); tips.push(d.match(/-?[\\d.]+/g).slice(2, 4).map(Number)); } }"
+                "return [tips, [...seen], [width, height]]",
+                list(poses),
+            )
+            assert set(seen) == kinds
+            assert len(tips) > 50
+            for x, y in tips:
+                assert 0 < x < size[0]
+                assert 0 < y < size[1]
+            # without them the drawing is as large as before
+            for key in keys:
+                page.press(key)
+            assert page("return scale") == alone
+            assert page.faults() == []
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

@@ -114,6 +114,28 @@ def test_rows_of_one_name_are_two(
     assert page.get("A.unbalance") == pytest.approx(unbalance, rel=1e-12)
 
 
+def test_a_mass_has_a_radius(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """A mass at radius 0 was answered as no unbalance, and the program refused the copied rows; a row of zeros is none."""
+    page, unbalance = rotor(["W1,5,20,30", "W2,7,20,100", "W3,0,0,0"], dalembert, tmp_path, browser)
+    rows = page("return dalembert.csv()")
+    assert page.get("A.unbalance") == pytest.approx(unbalance, rel=1e-12)
+    assert not page.put(**{"W2.radius": 0.0})
+    assert page.text("alert") == "W2.radius: found 0, expected a positive radius, for there is a mass"
+    assert math.isnan(page.get("A.unbalance"))
+    assert page("return dalembert.csv()") == ""
+    assert page("return document.querySelectorAll('svg.polygon').length") == 0
+    assert page.put(**{"W2.mass": 0.0})
+    assert page.get("A.unbalance") == pytest.approx(1e-4, rel=1e-12)
+    page.button("undo")
+    page.button("undo")
+    assert page("return dalembert.csv()") == rows
+    # each of several, named
+    assert not page.put(**{"W1.radius": 0.0, "W2.radius": 0.0})
+    assert page.text("alert").count("positive radius") == 2
+    page.button("reset")
+    assert page.text("alert") == ""
+
+
 def test_the_keyboard_goes_on_where_rows_come_and_go(
     dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:

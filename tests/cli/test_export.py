@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from cli.formats import read
-from cli.formats.description import described
-from cli.formats.export_command import file_bytes
-from cli.formats.settled import settle
 from dalembert.errors import DataError
 from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
+from virtualwork.exchange.description import described
+from virtualwork.exchange.export import file_bytes
+from virtualwork.exchange.settled import settle
 
 ROBOTS = (".xml", ".urdf", ".sdf")
 # inputs that no joint is: another joint is driven in their place, and it is said

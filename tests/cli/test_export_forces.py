@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.formats.export_command import file_bytes
 from tests.cli.exported import MASSIVE, exported, home, moved
 from tests.cli.imported import only
 from tests.conftest import Dalembert
 from virtualwork import Input, Link, Mechanism
+from virtualwork.exchange.export import file_bytes
 
 ROBOTS = (".xml", ".urdf", ".sdf")
 # a bar slides on a rocker as the wheel on the rocker turns; its tip runs in a slot of the ground

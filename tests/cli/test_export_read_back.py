@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.formats.drawing import Travel
-from cli.formats.skeleton import Joint, Skeleton
 from dalembert.errors import DataError
 from tests.cli.exported import FILES, FOUR_BAR, MASSIVE, exported, home, moved
 from virtualwork import Mechanism
+from virtualwork.exchange.drawing import Travel
+from virtualwork.exchange.skeleton import Joint, Skeleton
 
 
 # --- MuJoCo -------------------------------------------------------------------------------------------------------

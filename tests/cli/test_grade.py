@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from cli.grade.marks import scale_of
+from cli.exercise.marks import scale_of
 from tests.cli.exercises import EXERCISE, ROTOR
 from tests.conftest import Dalembert
 

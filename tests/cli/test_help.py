@@ -15,7 +15,7 @@ import pytest
 
 from cli import COMMANDS
 from cli.show.commands import SHARED, help_lines
-from cli.show.terminal import progress, progress_in_time
+from dalembert.terminal import progress, progress_in_time
 from tests.conftest import Dalembert
 
 COMMAND = Path(sys.executable).with_name("dalembert")
@@ -201,8 +201,8 @@ def test_progress_of_one_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.virtualwork.released import double_pendulum
     from virtualwork.intime.run import simulate
 
-    monkeypatch.setattr("cli.show.terminal.AFTER", -1.0)
-    monkeypatch.setattr("cli.show.terminal.EVERY", -1.0)
+    monkeypatch.setattr("dalembert.terminal.AFTER", -1.0)
+    monkeypatch.setattr("dalembert.terminal.EVERY", -1.0)
     assembly = double_pendulum().assembly
     plain = simulate(assembly, [0.0, 0.5])
     for stream in (Terminal(), io.StringIO()):
@@ -267,7 +267,7 @@ def parsed(words: list[str]) -> dict[str, object]:
 
     from cli.show.commands import with_options
     from cli.show.help import with_help
-    from cli.show.result import Result
+    from dalembert.results.result import Result
 
     taken: list[dict[str, object]] = []
 

@@ -53,7 +53,7 @@ def test_springs_of_mjcf_ask_for_mujocos_effort() -> None:
 def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
     """Every way to write an orientation, nested frames and defaults, against MuJoCo's own reader."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    from cli.formats import read_robot
+    from rigidbody3d.robots.reading import read as read_robot
 
     text = """<mujoco><compiler angle="degree" eulerseq="zyX"/>
 <default><default class="s"><site pos="0 0 0.1"/></default></default><worldbody>
@@ -97,7 +97,7 @@ def test_springs_of_a_chain_count_the_whole_turns_of_both_inputs() -> None:
 @pytest.mark.parametrize("total", [-1, 14])
 def test_masses_that_follow_from_shapes_are_mujocos(total: int) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
-    from cli.formats import read_robot
+    from rigidbody3d.robots.reading import read as read_robot
 
     shapes = [
         '<geom size=".1"/>',

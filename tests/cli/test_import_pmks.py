@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from cli.formats.pmksweb import number
 from tests.cli.imported import FORMATS, FOUR_BAR, at, only, taken
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
+from virtualwork.exchange.pmksweb import number
 
 
 @pytest.mark.parametrize("file", sorted(FORMATS.glob("pmks_text/*")), ids=lambda file: file.name)

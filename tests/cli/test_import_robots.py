@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from cli.formats import read
-from cli.formats.description import described
-from cli.formats.settled import settle
 from dalembert.errors import DataError
 from tests.cli.robots import LOOPS, MJCF, SDF, URDF, refused, taken
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
+from virtualwork.exchange.description import described
+from virtualwork.exchange.settled import settle
 
 
 def test_an_sdf_model_stands_where_its_poses_say() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-from fractions import Fraction
 from pathlib import Path
 
 import openpyxl
@@ -13,8 +12,8 @@ import pytest
 
 from cli.show.commands import ShowOptions
 from cli.show.output import show
-from cli.show.result import Result
 from dalembert.results.columns import Column, Table
+from dalembert.results.result import Result
 from tests.conftest import Dalembert
 
 MASSES = "name,mass_g,radius_mm,angle_deg,z_mm\na,13.5,20,{0},10\nb,7.1,15,{1},30\n"
@@ -160,54 +159,3 @@ def test_units_in_capitals_are_those_of_the_second_run_too(dalembert: Dalembert,
     shown = {dalembert("mechanism", "m.toml", *way, "--at", "60DEG", "--only", "P.vx").stdout for way in ways}
     assert len(shown) == 1
     assert "P_vx_m_s" in shown.pop()
-
-
-@pytest.mark.whole
-@pytest.mark.parametrize("angle", [0, 90, 30, 137, 300.5])
-@pytest.mark.parametrize("unbalance", ["1", "0", "0.3", "17.9", "49.7"])
-def test_simple_unbalances_have_simple_corrections(
-    unbalance: str, angle: float, dalembert: Dalembert
-) -> None:
-    table = f"unbalance_g_mm,angle_deg\n{unbalance},{angle}\n"
-    done = dalembert("balance", "-", "--plane", "A:20mm", "--json", stdin=table)
-    (rotor,) = json.loads(done.stdout)["rotors"]
-    (correction,) = rotor["corrections"]
-    exact = Fraction(unbalance) / 10**6
-    assert rotor["initial"]["static_unbalance_kg_m"] == float(exact)
-    assert correction["unbalance_kg_m"] == float(exact)
-    assert correction["mass_kg"] == float(exact * 50)
-
-
-def test_simple_masses_have_simple_corrections_in_two_planes(dalembert: Dalembert) -> None:
-    rows = [(mass, radius, z) for mass in (1, 7.3, 12.5) for radius in (20, 37) for z in (10, 15, -5)]
-    table = "rotor,mass_g,radius_mm,angle_deg,z_mm\n" + "".join(
-        f"{k},{mass},{radius},30,{z}\n" for k, (mass, radius, z) in enumerate(rows)
-    )
-    planes = ("--plane", "A:0mm:20mm", "--plane", "B:50mm:25mm")
-    done = dalembert("balance", "-", *planes, stdin=table)
-    made = [float(row["mass_g"]) for row in csv.DictReader(io.StringIO(done.stdout))]
-    for k, (mass, radius, z) in enumerate(rows):
-        whole, share = Fraction(str(mass)) * radius, Fraction(z, 50)
-        assert made[2 * k : 2 * k + 2] == [
-            float(abs(whole * (1 - share)) / 20),
-            float(abs(whole * share) / 25),
-        ]
-
-
-def test_simple_ounces_have_simple_corrections(dalembert: Dalembert) -> None:
-    table = "mass_oz,radius_in,angle_deg,z_in\n1,2,30,1\n"
-    planes = ("--plane", "A:0in:2in", "--plane", "B:5in:2in")
-    rows = list(csv.DictReader(io.StringIO(dalembert("balance", "-", *planes, stdin=table).stdout)))
-    assert [(row["unbalance_oz_in"], row["mass_oz"]) for row in rows] == [("1.6", "0.8"), ("0.4", "0.2")]
-
-
-@pytest.mark.parametrize("angle", [0, 30, 210])
-def test_index_and_flywheel_of_simple_numbers(angle: float, dalembert: Dalembert) -> None:
-    for unit in ("unbalance_g_mm,angle_deg", "amplitude_um,phase_deg"):
-        table = f"turned_deg,{unit}\n0,1.1,{angle}\n180,0.3,{angle}\n"
-        rotor, mandrel = csv.reader(dalembert("index", "-", stdin=table).stdout.splitlines()[1:])
-        assert [rotor[1], mandrel[1]] == ["0.4", "0.7"]
-    torque = "angle_deg,torque_N_m\n0,0\n90,30\n180,-10\n270,5.3\n360,0\n"
-    options = ("--speed", "600rpm", "--fluctuation", "0.02", "--json")
-    wheel = json.loads(dalembert("flywheel", "-", *options, stdin=torque).stdout)
-    assert [wheel["mean_torque_N_m"], wheel["slowest_angle_deg"]] == [6.325, 18.975]

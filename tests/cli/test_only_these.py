@@ -7,8 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from cli.spin import tables
-from cli.spin.rotation import Rotation, read_body
+from cli.body import states
+from rigidbody3d.rotation_in_time import Rotation
+from rigidbody3d.turning_body import read_body
 
 RACKET = "inertia = [1, 2, 3]\nomega = [0.01, 1, 0.01]\n"
 ALL = ("omega", "attitude", "momentum", "energy")
@@ -21,7 +22,7 @@ def rotation(folder, toml: str = RACKET) -> Rotation:
 
 
 def test_a_rotation_computes_what_is_named_and_shows_the_same_numbers(tmp_path) -> None:
-    every = tables.states(rotation(tmp_path)).cells
+    every = states.states(rotation(tmp_path)).cells
     for only, needs in (
         ({"omega"}, {"omega"}),
         ({"attitude"}, {"attitude"}),
@@ -29,13 +30,13 @@ def test_a_rotation_computes_what_is_named_and_shows_the_same_numbers(tmp_path) 
         ({"momentum", "omega"}, {"omega", "attitude", "momentum"}),
     ):
         of = rotation(tmp_path)
-        cells = tables.states(of, only).cells
+        cells = states.states(of, only).cells
         assert {name for name in ALL if name in vars(of.states)} == needs
         assert {name.split("_")[0] for name in cells} == {"t", *only}
         assert all(list(cells[name]) == list(every[name]) for name in cells)
     # a period is that of ω alone: four quarter periods of the elliptic functions, and no state
     of = rotation(tmp_path)
-    assert tables.constants(of, {"period"}).cells["period_s"][0] == of.period
+    assert states.constants(of, {"period"}).cells["period_s"][0] == of.period
     assert not {*ALL} & {*vars(of.states)}
 
 

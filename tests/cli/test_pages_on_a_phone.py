@@ -38,7 +38,7 @@ const contrast = (e) => {
 };
 return {
   wide: document.documentElement.scrollWidth,
-  small: controls.filter((e) => Math.min(area(e).width, area(e).height) < 31.5).map(called),
+  small: controls.filter((e) => Math.min(area(e).width, area(e).height) < (e.matches(".grip") ? 31.5 : 39.5)).map(called),
   nameless: controls.filter((e) => !named(e)).map(called),
   faint: words.filter((e) => contrast(e) < 4.5).map(called),
 };

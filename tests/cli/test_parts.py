@@ -14,7 +14,7 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from cli.show import files
+from dalembert.results import files
 from dalembert.results.columns import Column, Table
 from tests.conftest import Dalembert
 from virtualwork.formulas.positions import BLOCK

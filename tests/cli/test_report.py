@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cli.examples import describe, names
-from cli.show.report import WIDE
+from dalembert.results.report import WIDE
 from tests.conftest import Dalembert
 
 HEAD = (

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from cli.read.options import HEAD, about
-from cli.spin.rotation import read_body
 from dalembert.errors import DataError, toml_text
+from dalembert.results.about import HEAD, about
+from rigidbody3d.turning_body import read_body
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
 from virtualwork.describe import DescriptionError

@@ -237,3 +237,26 @@ def test_a_link_that_carries_a_motor_has_their_common_centre(dalembert: Any, tmp
     torques = {(b["link"], t["name"]): t["torque_N_m"] for b in cut["bodies"] for t in b["torques"]}
     assert torques["tool", "T"] == pytest.approx(2.0)
     assert torques["arm", "−T"] == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize("guide", [0, 90, 180, 270])
+@pytest.mark.parametrize("crank", [40, 90, 270])
+def test_components_that_are_zero_are_zero(dalembert: Any, tmp_path: Path, crank: int, guide: int) -> None:
+    """(−5.76, 2.1e−16) stood for the velocity of a piston, and a column of 3.5e−16 beside one of 5.76."""
+    way = complex(round(math.cos(math.radians(guide))), round(math.sin(math.radians(guide))))
+    (tmp_path / "s.toml").write_text(
+        "[ground]\nO = [0, 0]\n[links.crank]\npoints = { O = [0, 0], A = [0.06, 0] }\nmass = 2\ncenter = [0.03, 0]\n"
+        "[links.rod]\npoints = { A = [0, 0], B = [0.2, 0] }\nmass = 1.5\ncenter = [0.08, 0]\ninertia = 0.005\n"
+        '[links.piston]\npoints = { B = [0, 0] }\nmass = 1.2\n[[sliders]]\npoint = "B"\nlink = "piston"\n'
+        f"on = \"ground\"\nthrough = [0, 0]\nangle = '{guide} deg'\n"
+        f'[[forces]]\nlink = "piston"\npoint = "B"\nforce = [{-500 * way.real}, {-500 * way.imag}]\n'
+        '[input]\nlink = "crank"\nspeed = 100\nacceleration = 0\n'
+        f"[guess]\nat = '{guide + 40} deg'\nrod = '{guide - 10} deg'\n"
+    )
+    call = ("forces", "s.toml", "--at", f"{crank + guide}deg", "--steps")
+    done = dalembert(*call, "--text", "--report", "r.html")
+    assert done.returncode == 0, done.stderr
+    shown = done.stdout[done.stdout.index("Ledger") :] + (tmp_path / "r.html").read_text().split("Ledger")[1]
+    words = re.sub(r"<svg.*?</svg>", "", shown, flags=re.S)
+    assert words.count("inertia force") > 3
+    assert re.findall(r"[^ >(]*e[-−][123]\d", words) == []

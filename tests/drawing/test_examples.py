@@ -14,7 +14,7 @@ from faults import faults
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-import cli.show.picture
+import dalembert.drawing.sheet
 from cli.app import main
 from cli.examples import ABOUT, EXAMPLES, describe, names
 
@@ -77,7 +77,7 @@ def draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Draw:
             figures.append(picture())
             return b""
 
-        monkeypatch.setattr(cli.show.picture, "drawn", keep)
+        monkeypatch.setattr(dalembert.drawing.sheet, "drawn", keep)
         monkeypatch.chdir(tmp_path)
         monkeypatch.setattr("sys.argv", [*call, "--plot", "picture.png"])
         with contextlib.suppress(SystemExit):

@@ -146,15 +146,17 @@ def faults(every: list[Tried], folder: Path, allowed: float) -> list[str]:
             for kind, x in zip(t.kinds, row, strict=True):
                 if math.isfinite(x):
                     largest[kind] = max(largest.get(kind, 0.0), abs(x))
-        # where accelerations cancel, the inertia forces round as what they are made of: I ω²/r, of 3 rad/s and 0.1 m
+        # where accelerations cancel, the inertia forces round as what they are made of: I ω²/r and m ω² r, of 3 rad/s and 0.1 m
+        made_of = {"inertia": 90, "mass": 0.9}
         inertia = max(
-            (abs(v) for of in t.changes for path, v in of.items() if path.endswith(".inertia")), default=0.0
+            (abs(v) * made_of.get(path.split(".")[-1], 0) for of in t.changes for path, v in of.items()),
+            default=0.0,
         )
         # of a link that only rounding turns, what cancels is of the size of the input's own rates
         for kind in (kind for kind in largest if kind[0] == "angle" and kind[1]):
             largest[kind] = max(largest[kind], t.rate ** kind[1])
         for kind in (kind for kind in largest if kind[0] == "load"):
-            largest[kind] = max(largest[kind], 90 * inertia)
+            largest[kind] = max(largest[kind], inertia)
         for change, row, true, condition in zip(t.changes, rows, t.true, t.conditions, strict=True):
             for name, kind, x, y in zip(t.names, t.kinds, map(float, row), true, strict=True):
                 if math.isfinite(x) != math.isfinite(y):

@@ -15,7 +15,7 @@ from benchmarks.stress.topology_followed import verdict
 from benchmarks.stress.topology_rates import rates
 
 # some half a minute
-MORE = 700
+MORE = 350
 
 # of 0.1.0: what was wrong with each of these
 FAULTS = {

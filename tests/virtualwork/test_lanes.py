@@ -78,7 +78,7 @@ def test_every_quantity_of_the_worked_examples_on_the_other_engines(name, engine
 def test_every_quantity_of_mechanisms_of_any_topology(monkeypatch) -> None:
     """Drawn at random at a pose: two to six links, slots, prisms and gears on moving links, one or two inputs."""
     compared = 0
-    for seed in range(120):
+    for seed in range(60):
         try:
             m = generate(seed).mechanism
             _ = m.assembly
@@ -86,7 +86,7 @@ def test_every_quantity_of_mechanisms_of_any_topology(monkeypatch) -> None:
             continue
         compare(m, monkeypatch, "numpy", 0.02)
         compared += 1
-    assert compared > 95
+    assert compared > 47
 
 
 @pytest.mark.parametrize("over", ["speed_rad_s", "angle_rad"])

@@ -8,11 +8,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import bare
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.group_loops import Loops, gaps, write_unknowns
+from virtualwork.formulas.group_loops import Loops, gaps, put_unknowns, write_unknowns
 from virtualwork.formulas.newton import newton
 from virtualwork.formulas.numbers import Number, dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
@@ -35,21 +36,8 @@ def guessed_unknowns(
     """
     if any(b not in angles for b in group.angles):
         return None
-    x = np.zeros((1, len(group.angles) + len(group.slides)))
-    x[0, : len(group.angles)] = [angles[b] for b in group.angles]
-    write_unknowns(group, st, x)
-    left = []
-    for j, g in enumerate(group.slides, len(group.angles)):
-        body = m.guides[g].on
-        # of a link that a rack turns with a slide of this group the turn is not known yet: the guess says it
-        tied = body in group.links and body in angles
-        on = complex(rotation(angles[body])) if tied else complex(np.ravel(st.turn[body])[0])
-        slide = guessed_slide(g, on, points, m, directions)
-        if slide is None:
-            left.append(j)
-        else:
-            x[0, j] = slide
-    write_unknowns(group, st, x)
+    numbers, left = of_guess(group, st, angles, points, m, directions)
+    x = np.array([numbers], dtype=float)
     if left:
         # the loops are linear in the slides
         along, gap = stack(columns(group, st), 1)[0][:, left], stack_rows(gaps(group, st), 1)[0]
@@ -59,15 +47,32 @@ def guessed_unknowns(
     return x
 
 
-def guessed_slide(
-    guide: int, on: Number, points: Mapping[str, Number], m: Description, directions: Mapping[int, Number]
-) -> Number:
-    """A slide from the guessed points, where its guide's body stands at the rotation `on`; None where they do not say."""
-    g = m.guides[guide]
-    origin = _origin(g.on, m.through(g), on, points, m)
-    if g.point not in points or origin is None:
-        return None
-    return dot(points[g.point] - origin, directions[guide] * on)
+def of_guess(
+    group: Group,
+    st: State,
+    angles: Mapping[str, Number],
+    points: Mapping[str, Number],
+    m: Description,
+    directions: Mapping[int, Number],
+) -> tuple[list[Number], list[int]]:
+    """A Newton group's unknowns as the guess has them, zero where it does not say them, and the places of slides that it does not.
+
+    They are put into the state.
+    """
+    x: list[Number] = [bare(angles.get(body, 0.0)) for body in group.angles]
+    put_unknowns(group, st, [*x, *(0.0 for _ in group.slides)])
+    for i in group.slides:
+        g = m.guides[i]
+        # of a link that a rack turns with a slide of this group the turn is not known yet: the guess says it
+        tied = g.on in group.links and g.on in angles
+        on = rotation(angles[g.on]) if tied else st.turn[g.on]
+        origin = _origin(g.on, m.through(g), on, points, m)
+        known = g.point in points and origin is not None
+        x.append(bare(dot(points[g.point] - origin, directions[i] * on)) if known else None)
+    left = [j for j, slide in enumerate(x) if slide is None]
+    x = [0.0 if slide is None else slide for slide in x]
+    put_unknowns(group, st, x)
+    return x, left
 
 
 def _origin(body: str, z: Number, turn: Number, points: Mapping[str, Number], m: Description) -> Number:

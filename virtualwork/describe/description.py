@@ -424,9 +424,9 @@ def refuse(m: Description) -> None:
         require(name, m.points, f"[guess] {name}", "link or point")
 
 
-def listed(m: Description, *kinds: type[Part]) -> Iterator[tuple[int, int, Part]]:
-    """Every part that stands in a list, or those of some kinds: its index there, its number in its table from 1, and the part."""
-    for kind in kinds or PARTS:
+def listed(m: Description) -> Iterator[tuple[int, int, Part]]:
+    """Every part that stands in a list: its index there, its number in its table from 1, and the part."""
+    for kind in PARTS:
         count: dict[str, int] = {}
         for i, part in enumerate(getattr(m, kind.collection)):
             count[part.table] = count.get(part.table, 0) + 1

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Real
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from dalembert.arithmetic.recorded import Constant
@@ -17,8 +18,8 @@ from dalembert.units import LARGEST, LISTED
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description, listed
 from virtualwork.describe.forms import Nested
-from virtualwork.describe.keys import Part, keys_of, table_keys
-from virtualwork.describe.parts import TABLES, Input, Link
+from virtualwork.describe.keys import keys_of, table_keys
+from virtualwork.describe.parts import Input, Link
 from virtualwork.describe.values import joined
 
 D = TypeVar("D", bound=Description)
@@ -54,8 +55,8 @@ class Dimension:
         return f"{self.path}_{self.unit}" if self.unit else self.path
 
 
-def dimensions(m: Description) -> dict[str, Dimension]:
-    """Every dimension of a mechanism by its path, in the order of the file.
+def dimensions(m: Description) -> Mapping[str, Dimension]:
+    """Every dimension of a mechanism by its path, in the order of the file; listed once.
 
     Examples
     --------
@@ -65,52 +66,29 @@ def dimensions(m: Description) -> dict[str, Dimension]:
     >>> listed["links.arm.P.x"].header, listed["links.arm.Q.angle"].header, "links.arm.Q.x" in listed
     ('links.arm.P.x_m', 'links.arm.Q.angle_deg', False)
     """
-    return {dimension.path: dimension for dimension in _all(m)}
+    held = vars(m)
+    if "_dimensions" not in held:
+        held["_dimensions"] = MappingProxyType({dimension.path: dimension for dimension in _all(m)})
+    result: Mapping[str, Dimension] = held["_dimensions"]
+    return result
 
 
 def _all(m: Description) -> Iterator[Dimension]:
     for point in m.ground:
-        yield from _ground(point)
+        yield from _numbers(f"ground.{point}", "length", ("x", "y"), ("ground", point))
     for name, link in m.links.items():
-        yield from _of_link(m, name, link.points)
+        yield from _of_link(name, link)
     yield from _declared("", (), m)
-    for entry in listed(m):
-        yield from _of_part(m, *entry)
+    for i, number, part in listed(m):
+        # the paths of a single input have no number
+        alone = part.table == "input" and len(m.inputs) == 1
+        prefix = "input." if alone else f"{part.table}.{number}."
+        yield from _declared(prefix, (part.collection, i), part, part.slides)
 
 
-def _near(m: Description, path: str) -> Iterator[Dimension]:
-    """The dimensions of the point, link or list that a path may name."""
-    table, _, rest = path.partition(".")
-    if table == "ground":
-        for point in _beginnings(rest, m.ground):
-            yield from _ground(point)
-    elif table == "links":
-        for name in _beginnings(rest, m.links):
-            own = rest[len(name) + 1 :].removeprefix("points.")
-            yield from _of_link(m, name, _beginnings(own, m.links[name].points))
-    elif table in TABLES:
-        for i, number, part in listed(m, TABLES[table]):
-            if path.startswith(_prefix(m, number, part)):
-                yield from _of_part(m, i, number, part)
-    else:
-        yield from _declared("", (), m)
-
-
-def _beginnings(text: str, names: Iterable[str]) -> list[str]:
-    """The names with which a text begins up to a dot, or is; in their order."""
-    ends = [k for k, letter in enumerate(text) if letter == "."]
-    found = {text[:k] for k in (*ends, len(text))}.intersection(names)
-    return list(found) if len(found) < 2 else [name for name in names if name in found]
-
-
-def _ground(point: str) -> Iterator[Dimension]:
-    return _numbers(f"ground.{point}", "length", ("x", "y"), ("ground", point))
-
-
-def _of_link(m: Description, name: str, points: Iterable[str]) -> Iterator[Dimension]:
-    """The numbers of some of a link's points, and its own."""
-    link = m.links[name]
-    for point in points:
+def _of_link(name: str, link: Link) -> Iterator[Dimension]:
+    """The numbers of a link's points, and its own."""
+    for point in link.points:
         # a point that is called as a key of the link is named by the longer path
         key = f"points.{point}" if point in table_keys(Link) else point
         where = ("links", name, "polar" if point in link.polar else "points", point)
@@ -119,16 +97,6 @@ def _of_link(m: Description, name: str, points: Iterable[str]) -> Iterator[Dimen
         else:
             yield from _numbers(f"links.{name}.{key}", "length", ("x", "y"), where)
     yield from _declared(f"links.{name}.", ("links", name), link)
-
-
-def _of_part(m: Description, i: int, number: int, part: Part) -> Iterator[Dimension]:
-    """The numbers of a part that stands in a list."""
-    return _declared(_prefix(m, number, part), (part.collection, i), part, part.slides)
-
-
-def _prefix(m: Description, number: int, part: Part) -> str:
-    """How the paths of a part in a list begin; that of a single input has no number."""
-    return "input." if part.table == "input" and len(m.inputs) == 1 else f"{part.table}.{number}."
 
 
 def _declared(prefix: str, where: Where, part: Any, slides: bool = False) -> Iterator[Dimension]:
@@ -155,7 +123,7 @@ def _numbers(path: str, kind: str, parts: tuple[str | int, ...], where: Where) -
         yield Dimension(path, kind, where)
 
 
-def named(m: Description, path: str, every: Mapping[str, Dimension] | None = None) -> tuple[Dimension, ...]:
+def named(m: Description, path: str) -> tuple[Dimension, ...]:
     """The dimensions that a path names: one, or both coordinates of a point.
 
     Raises
@@ -163,16 +131,13 @@ def named(m: Description, path: str, every: Mapping[str, Dimension] | None = Non
     DescriptionError
         Where the path names none, or is of the wrong kind; the nearest is named.
     """
+    every = dimensions(m)
     if not isinstance(path, str):
-        raise DescriptionError(
-            f"expected a path such as '{next(iter(dimensions(m)), 'links')}', found {path!r}"
-        )
-    near = {each.path: each for each in _near(m, path)} if every is None else every
-    if path in near:
-        return (near[path],)
-    if f"{path}.x" in near:
-        return near[f"{path}.x"], near[f"{path}.y"]
-    every = dimensions(m) if every is None else every
+        raise DescriptionError(f"expected a path such as '{next(iter(every), 'links')}', found {path!r}")
+    if path in every:
+        return (every[path],)
+    if f"{path}.x" in every:
+        return every[f"{path}.x"], every[f"{path}.y"]
     stem, _, last = path.rpartition(".")
     # the key of the other form of a point
     other = {"x": "length", "y": "length", "length": "x", "angle": "x"}.get(last)
@@ -254,10 +219,9 @@ def parts_with(m: Description, numbers: Mapping[str, Any]) -> dict[str, Any]:
         raise DescriptionError(
             f"expected numbers by their paths, such as {{'{next(iter(dimensions(m)))}': 1.0}}, found {numbers!r}"
         )
-    every = dimensions(m)
     parts: dict[Any, Any] = {f.name: getattr(m, f.name) for f in fields(m)}
     for path, number in numbers.items():
-        places = named(m, path, every)
+        places = named(m, path)
         for dimension, part in zip(places, _finite(path, number, len(places)), strict=True):
             first, *rest = dimension.where
             parts[first] = _with(parts[first], tuple(rest), part)

@@ -19,7 +19,7 @@ class Numbered(Description):
         """Every number of the description by its path in the file, `links.crank.B.x`, with its kind and unit."""
         from virtualwork.describe.dimensions import dimensions
 
-        return dimensions(self)
+        return dict(dimensions(self))
 
     def value(self, path: str) -> float | complex:
         """Return the number at a path, SI; x + iy of a point; 0 for a rate of an input that the file does not give.

@@ -176,9 +176,7 @@ def _tolerances(file: File, m: Description) -> dict[str, float]:
     if "tolerances" not in file.data:
         return limits
     # most files have none
-    from virtualwork.describe.dimensions import dimensions, named
-
-    every = dimensions(m)
+    from virtualwork.describe.dimensions import named
 
     def walk(table: Mapping[str, Any], before: str) -> None:
         for key, value in table.items():
@@ -188,7 +186,7 @@ def _tolerances(file: File, m: Description) -> dict[str, float]:
                 continue
             where = f"[tolerances] {path}"
             try:
-                kind = named(m, path, every)[0].kind
+                kind = named(m, path)[0].kind
             except DescriptionError as error:
                 raise DescriptionError(f"[tolerances]: {error}") from None
             limits[path] = file.units.number(value, kind, where)

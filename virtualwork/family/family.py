@@ -58,14 +58,13 @@ class Family:
 
     def __init__(self, mechanism: Description, numbers: Mapping[str, ArrayLike]) -> None:
         self.mechanism = mechanism
-        paths = dimensions(mechanism)
         if not isinstance(numbers, Mapping) or not numbers:
             raise ValueError(
-                f"vary: expected numbers by their paths, such as {{'{next(iter(paths), 'path')}': [...]}}, found {numbers!r}"
+                f"vary: expected numbers by their paths, such as {{'{next(iter(dimensions(mechanism)), 'path')}': [...]}}, found {numbers!r}"
             )
         columns: dict[Dimension, Reals] = {}
         for path, values in numbers.items():
-            components = named(mechanism, path, paths)
+            components = named(mechanism, path)
             column = np.asanyarray(values)
             if np.iscomplexobj(column) and len(components) == 2:
                 column = np.stack([column.real, column.imag], axis=-1)

@@ -17,7 +17,7 @@ import numpy as np
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, number_of
+from virtualwork.describe.dimensions import Dimension, by_path, changed, named, number_of
 from virtualwork.family.design import Design
 from virtualwork.family.fitted import FINE, D, Fit
 from virtualwork.family.keep import HELD, JUDGED, Bound, Bounds, Held, Kept
@@ -375,10 +375,9 @@ def _refined(problem: _Problem[Any], x: Reals, inputs: Sequence[Reals], steps: i
 def _free(
     m: Description, free: Mapping[str, tuple[float, float]], forces: bool
 ) -> dict[Dimension, tuple[float, float]]:
-    every = dimensions(m)
     result: dict[Dimension, tuple[float, float]] = {}
     for path, (low, high) in free.items():
-        (dimension, *both) = named(m, path, every)
+        (dimension, *both) = named(m, path)
         if both:
             raise DescriptionError(f"'{path}' names two numbers: expected {dimension.path} or {both[0].path}")
         of, last = dimension.where[0], dimension.where[-1]

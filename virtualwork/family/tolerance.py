@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, dimensions, named, number_of
+from virtualwork.describe.dimensions import Dimension, named, number_of
 from virtualwork.family.family import Family
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.quantity import Quantity
@@ -82,11 +82,7 @@ def limits(m: Description, requested: Mapping[str, float]) -> dict[Dimension, fl
     DescriptionError
         Where a path names no number.
     """
-    every = dimensions(m)
-    limits: dict[Dimension, float] = {}
-    for path, limit in requested.items():
-        limits |= dict.fromkeys(named(m, path, every), limit)
-    return limits
+    return {dimension: limit for path, limit in requested.items() for dimension in named(m, path)}
 
 
 @dataclass(frozen=True, eq=False)

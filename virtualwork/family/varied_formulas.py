@@ -15,7 +15,7 @@ from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distances, sign_of_angles
 from virtualwork.branch.phases import Phases, with_constants
-from virtualwork.branch.solutions import guessed_slide
+from virtualwork.branch.solutions import of_guess
 from virtualwork.describe.description import Description, joints_apart, known_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, number_of
 from virtualwork.describe.keys import keys_of
@@ -386,13 +386,8 @@ class VariedFormulas:
                 st.angle.update({body: principal_of(st.turn[body]) for body in group.members})
                 return
             trial = st.copy()
-            x: list[Number] = [bare(angles.get(body, 0.0)) for body in group.angles]
-            put_unknowns(group, trial, [*x, *(0.0 for _ in group.slides)])
-            for g in group.slides:
-                x.append(guessed_slide(g, trial.turn[m.guides[g].on], points, m, self.plan.directions))
-            free = self.free[name] = [i for i, slide in enumerate(x) if slide is None]
-            x = [0.0 if slide is None else bare(slide) for slide in x]
-            put_unknowns(group, trial, x)
+            x, free = of_guess(group, trial, angles, points, m, self.plan.directions)
+            self.free[name] = free
             outputs.update({f"guess {name} {i}": number for i, number in enumerate(x)})
             along = columns(group, trial)
             for loop, gap in enumerate(gaps(group, trial)):

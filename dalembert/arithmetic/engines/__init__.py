@@ -21,7 +21,7 @@ R = TypeVar("R")
 Reals = NDArray[np.float64]
 Rows = Sequence[Reals] | Reals
 Tables = Sequence[NDArray[Any]] | NDArray[Any]
-NARROW = 32  # columns from which on a grid is worked on as one
+NARROW = 32  # columns from which on few lanes of a grid are worked on as one
 WIDEST = 8  # columns from which on compiled code takes a grid: its longest vector
 FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
 PAYS = 3e8  # operations × lanes of one tape from which compiling it pays (some 0.1 s with the import)
@@ -159,9 +159,11 @@ def run_grid(
     arrays = [np.asarray(inputs[name], dtype=float) for name in tape.inputs]
     arrays = [x.reshape(()) if x.size == 1 else x for x in arrays]
     engine = wanted() or chosen(tape, r * c)
-    if r > 1 and engine == "llvm" and c >= WIDEST and _on_llvm(tape, arrays, table, shape):
+    wide = r > 1 and (engine == "numpy" or (engine == "llvm" and c >= WIDEST))
+    if wide and engine == "llvm" and _on_llvm(tape, arrays, table, shape):
         return table
-    if r > 1 and engine != "python" and c >= NARROW:
+    # few lanes are done sooner than a tape is prepared
+    if wide and (c >= NARROW or lanes_in_all(r * c) > blocks.NARROW):
         from dalembert.arithmetic.engines import grids
 
         grids.run(tape, arrays, shape, table)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.arrays import EXPONENT, NUMPY
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.exact import UPPER, upper
-from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.sines import STEPS, table
 from dalembert.arithmetic.tape import Operation, Tape, performed, shortened
 
@@ -44,7 +43,6 @@ UFUNCS = {
     "atan2": "arctan2",
 }
 
-_FUNCTIONS: dict[str, Any] = {kind: getattr(np, name) for kind, name in UFUNCS.items()}
 # what the formulas of plain numbers consist of
 SIMPLE = {*UFUNCS, "const", "input", "select", "binade"}
 
@@ -251,30 +249,34 @@ def _runs(tape: Tape) -> list[int]:
 
 
 def _once(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
-    """Do a tape's operations one by one: of lanes by numpy, of what is the same for all of them on floats."""
-    inputs = {name: x if x.ndim else float(x) for name, x in zip(tape.inputs, columns, strict=True)}
-    values: list[Any] = []
+    """Do a tape's operations one by one."""
     with np.errstate(all="ignore"):
-        for kind, *arguments in tape.operations:
-            if kind == "const":
-                values.append(arguments[0])
-            elif kind == "input":
-                values.append(inputs[arguments[0]])
-            else:
-                of = [values[a] for a in arguments]
-                if isinstance(of[0], float) and all(isinstance(x, float) for x in of):
-                    values.append(_on_floats(kind, of))
-                elif kind in UFUNCS:
-                    values.append(_FUNCTIONS[kind](*of))
-                else:
-                    values.append(performed(kind, of, NUMPY))
+        values = one_by_one(tape, dict(zip(tape.inputs, columns, strict=True)))
     for row, (_, number) in zip(out, tape.outputs, strict=True):
         row[:] = values[number]
+
+
+def one_by_one(tape: Tape, inputs: Mapping[str, Reals], left: Sequence[bool] | None = None) -> list[Any]:
+    """The values of a tape's operations: of arrays by numpy, of numbers on floats; None where they are `left` for later."""
+    values: list[Any] = []
+    for number, (kind, *arguments) in enumerate(tape.operations):
+        if kind == "const":
+            values.append(arguments[0])
+        elif kind == "input":
+            x = inputs[arguments[0]]
+            values.append(x if x.ndim else float(x))
+        elif left is not None and left[number]:
+            values.append(None)
+        else:
+            of = [values[a] for a in arguments]
+            same = all(isinstance(x, float) for x in of)
+            values.append(_on_floats(kind, of) if same else performed(kind, of, NUMPY))
+    return values
 
 
 def _on_floats(kind: str, of: list[float]) -> float:
     """An operation on floats; where Python raises, with numpy's infinity or NaN."""
     try:
-        return float(performed(kind, of, RECORDED))
+        return float(performed(kind, of, floats.FLOATS))
     except (ZeroDivisionError, ValueError, OverflowError):
         return float(performed(kind, [np.float64(x) for x in of], NUMPY))

@@ -1,8 +1,8 @@
 """The tape in numbers of 32 digits.
 
-A few lanes run on doubled numbers as they stand: over blocks of lanes, each value freed after its last use; what depends on
-uniform inputs alone is worked out once, on Python's numbers. Where there is more to do, the tape is run once on recorded
-doubled numbers: what they do is a tape in floats, of some ten operations for each, which the engines of all tapes run.
+A few lanes run on doubled numbers as they stand, each value freed after its last use; what depends on uniform inputs alone
+stays Python's numbers. Where there is more to do, the tape is run once on recorded doubled numbers: what they do is a tape
+in floats, of some ten operations for each, which the engines of all tapes run.
 """
 
 from __future__ import annotations
@@ -25,10 +25,8 @@ from dalembert.arithmetic.recorded import Recorder
 from dalembert.arithmetic.sines import WHOLE
 from dalembert.arithmetic.tape import EMPTY, Tape, performed
 
-# lanes of a block: its numbers stay in the cache
-BLOCK = 4096
 # lanes from which writing a tape in floats pays, for numpy; and how many operations in floats one comes to, for compiled code
-PAYS, EACH = 4e4, 12.0
+PAYS, EACH = 1e4, 12.0
 # of the difference of two runs, and of the quantity: what the second run itself may be off by, far from singular places
 OWN, LAST = 1.01, 2.0**-96
 ZERO, TURN = Doubled(0.0), PI * 2.0
@@ -70,29 +68,15 @@ def run(tape: Tape, inputs: Mapping[str, Any], direct: bool = False) -> dict[str
     lanes = {len(x.high) for x in numbers.values() if np.ndim(x.high)}
     if len(lanes) > 1:
         raise ValueError(f"inputs of different lengths: {', '.join(map(str, sorted(lanes)))}")
-    alone, n = not lanes, lanes.pop() if lanes else 0
+    n = lanes.pop() if lanes else 0
     if n > FEW and not direct:
         engine = _engine(tape, n)
         if engine is not None:
-            out = _in_floats(tape, numbers, engine)
-            return {name: Doubled(out[name], out[f"{name} low"]) for name in tape.names}
-    uniform, varying, last = _split(tape, frozenset(name for name, x in numbers.items() if np.ndim(x.high)))
+            parts = _in_floats(tape, numbers, engine)
+            return {name: Doubled(parts[name], parts[f"{name} low"]) for name in tape.names}
     with np.errstate(all="ignore"):
-        common = _run(tape, numbers, uniform, {}, {})
-        if alone:
-            return {name: common[number] for name, number in tape.outputs}
-        results: dict[int, Any] = {
-            number: common[number] if number in common else Doubled(np.empty(n), np.empty(n))
-            for number in dict.fromkeys(number for _, number in tape.outputs)
-        }
-        for start in range(0, n, BLOCK):
-            rows = slice(start, min(start + BLOCK, n))
-            here = {name: _rows(x, rows) for name, x in numbers.items()}
-            values = _run(tape, here, varying, dict(common), last)
-            for number, whole in results.items():
-                if number not in common:
-                    whole.high[rows], whole.low[rows] = values[number].high, values[number].low
-    return {name: results[number] for name, number in tape.outputs}
+        out = _run(tape, numbers)
+    return {name: Doubled(x.high, x.low + np.zeros(n)) if np.ndim(x.high) else x for name, x in out.items()}
 
 
 def compared(
@@ -229,56 +213,37 @@ def in_floats(tape: Tape, rests: frozenset[str], answers: tuple[Answer, ...] = (
         name: Doubled(recorder.input(name), recorder.input(f"{name} low") if name in rests else 0.0)
         for name in tape.inputs
     }
-    values = _run(tape, numbers, tuple(range(len(tape.operations))), {}, {})
-    places, outputs = dict(tape.outputs), dict[str, Any]()
+    values, outputs = _run(tape, numbers), dict[str, Any]()
     for i, (parts, turning) in enumerate(answers):
-        exact = [values[places.pop(part)] if part in places else ZERO for part in parts]
+        exact = [values.pop(part, ZERO) for part in parts]
         entering = [recorder.input(f"answer {part}") for part in parts]
         outputs[f"estimate {i}"] = estimated(exact, entering, turning)
-    for name, number in places.items():
-        outputs |= {name: values[number].high, f"{name} low": values[number].low}
+    for name, value in values.items():
+        outputs |= {name: value.high, f"{name} low": value.low}
     return recorder.tape(outputs)
 
 
-def _rows(x: Doubled, rows: slice) -> Doubled:
-    if not np.ndim(x.high):
-        return x
-    return Doubled(x.high[rows], x.low[rows] if np.ndim(x.low) else x.low)
-
-
 @lru_cache(maxsize=128)
-def _split(
-    tape: Tape, arrays: frozenset[str]
-) -> tuple[tuple[int, ...], tuple[int, ...], dict[int, tuple[int, ...]]]:
-    """The operations that are the same for all lanes, the others, and what each of these is the last to use."""
-    lanes = tape.dependence({name: int(name in arrays) for name in tape.inputs})
-    uniform = tuple(number for number, varies in enumerate(lanes) if not varies)
-    varying = tuple(number for number, varies in enumerate(lanes) if varies)
+def _ends(tape: Tape) -> list[list[int]]:
+    """What each operation is the last to use, but for the outputs."""
     outputs = {number for _, number in tape.outputs}
-    user = {
+    last = {
         a: number
-        for number in varying
-        for a in tape.operations[number][1:]
-        if tape.operations[number][0] != "input"
+        for number, (kind, *of) in enumerate(tape.operations)
+        for a in (() if kind in ("const", "input") else of)
     }
-    last: dict[int, tuple[int, ...]] = {}
-    for a, number in user.items():
-        if lanes[a] and a not in outputs:
-            last[number] = (*last.get(number, ()), a)
-    return uniform, varying, last
+    ends: list[list[int]] = [[] for _ in tape.operations]
+    for a, number in last.items():
+        if a not in outputs:
+            ends[number].append(a)
+    return ends
 
 
-def _run(
-    tape: Tape,
-    inputs: Mapping[str, Doubled],
-    which: tuple[int, ...],
-    values: dict[int, Any],
-    last: Mapping[int, tuple[int, ...]],
-) -> dict[int, Any]:
+def _run(tape: Tape, inputs: Mapping[str, Doubled]) -> dict[str, Doubled]:
+    """The outputs, operation by operation on doubled numbers."""
+    values: dict[int, Any] = {}
     turns: dict[int, tuple[Doubled, Doubled]] = {}
-    operations = tape.operations
-    for number in which:
-        kind, *of = operations[number]
+    for number, ((kind, *of), ends) in enumerate(zip(tape.operations, _ends(tape), strict=True)):
         if kind == "const":
             values[number] = Doubled(of[0])
         elif kind == "input":
@@ -289,6 +254,6 @@ def _run(
             values[number] = turns[of[0]][kind == "cos"]
         else:
             values[number] = performed(kind, [values[a] for a in of], DOUBLED)
-        for a in last.get(number, ()):
+        for a in ends:
             del values[a]
-    return values
+    return {name: values[number] for name, number in tape.outputs}

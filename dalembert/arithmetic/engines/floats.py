@@ -7,7 +7,6 @@ that is run again and again.
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any
@@ -20,21 +19,20 @@ LONGEST = 2000  # operations of one function: Python's own compiler slows down o
 DEEPEST = 12  # operations of one expression
 PAYS = 100  # lanes of a tape from which on to compile it pays
 
-ONE: dict[str, Callable[[float], float]] = {
-    "neg": operator.neg,
-    "abs": abs,
-    "sqrt": math.sqrt,
-    "sin": math.sin,
-    "cos": math.cos,
-    "binade": binade,
-}
-TWO: dict[str, Callable[[float, float], float]] = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "atan2": math.atan2,
-}
+
+class Floats:
+    """The functions of floats, for `Tape.on`; they raise where Python's do."""
+
+    const, binade = staticmethod(float), staticmethod(binade)
+    sqrt, sin, cos = staticmethod(math.sqrt), staticmethod(math.sin), staticmethod(math.cos)
+    atan2 = staticmethod(math.atan2)
+
+    @staticmethod
+    def select(test: float, positive: float, otherwise: float) -> float:
+        return positive if test > 0 else otherwise
+
+
+FLOATS = Floats()
 
 
 @lru_cache(maxsize=256)
@@ -160,19 +158,4 @@ _runs = lru_cache(maxsize=256)(_Runs)
 
 def _once(tape: Tape, *inputs: float) -> list[float]:
     """Do a tape's operations one by one."""
-    enter = iter(inputs)
-    values: list[float] = []
-    for operation in tape.operations:
-        kind = operation[0]
-        if kind in TWO:
-            values.append(TWO[kind](values[operation[1]], values[operation[2]]))
-        elif kind in ONE:
-            values.append(ONE[kind](values[operation[1]]))
-        elif kind == "const":
-            values.append(operation[1])
-        elif kind == "input":
-            values.append(next(enter))
-        else:
-            _, test, positive, otherwise = operation
-            values.append(values[positive] if values[test] > 0 else values[otherwise])
-    return [values[number] for _, number in tape.outputs]
+    return [*tape.on(dict(zip(tape.inputs, inputs, strict=True)), FLOATS).values()]

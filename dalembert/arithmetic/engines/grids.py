@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.arrays import NUMPY
-from dalembert.arithmetic.engines.blocks import Blocks
-from dalembert.arithmetic.tape import Tape, performed
+from dalembert.arithmetic.engines.blocks import Blocks, one_by_one
+from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 # columns at a time: what depends on them alone stays in the cache; lanes at a time
@@ -27,16 +26,7 @@ class Grid(Blocks):
     def over(self, inputs: Mapping[str, Any], out: Sequence[NDArray[Any]], shape: tuple[int, int]) -> None:
         """Run: inputs are numbers, (r, 1), (1, c) or (r, c); of each output (r, c), or for a test (r,)."""
         r, c = shape
-        values: list[Any] = []
-        for number, (kind, *arguments) in enumerate(self.tape.operations):
-            if kind == "const":
-                values.append(np.float64(arguments[0]))
-            elif kind == "input":
-                values.append(inputs[arguments[0]])
-            elif self.of_lanes[number]:
-                values.append(None)
-            else:
-                values.append(performed(kind, [values[a] for a in arguments], NUMPY))
+        values = one_by_one(self.tape, inputs, self.of_lanes)
         operands = [inputs[name] for name in self.varying] + [
             np.asarray(values[number]) for number in self.read
         ]
@@ -60,7 +50,8 @@ class Grid(Blocks):
                 for k, table in tried.items():
                     out[self.written[k]][rows] &= (table > 0).all(axis=1)
         for row, kind, source in self.fill:
-            value = values[source] if kind == "common" else inputs[source] if kind == "input" else out[source]
+            of = values[source] if kind == "common" else inputs[source] if kind == "input" else out[source]
+            value = np.asarray(of)
             if out[row].ndim == 2:
                 out[row][:] = value
             else:
