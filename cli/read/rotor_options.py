@@ -186,8 +186,8 @@ def verdict_table(rows: Sequence[tuple[str, Verdict]], unit: str) -> Table:
     columns = [
         names("rotor", [name for name, _ in rows]),
         names("plane", [v.plane for _, v in rows]),
-        number("permissible", "unbalance", share, unit, shortened=True),
-        number("initial", "unbalance", before, unit, shortened=True),
+        number("permissible", "unbalance", share, unit),
+        number("initial", "unbalance", before, unit),
         replace(residual, stored=after),
         names("verdict", [v.of(v.residual) for _, v in rows], place=None),
     ]
