@@ -65,6 +65,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "picture",
             "planes",
             "rotor",
+            "rotor_svg",
             "synchronous",
         ),
         ("marks", "triangle"),
