@@ -66,6 +66,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "picture",
             "planes",
             "rotor",
+            "rotor_svg",
             "synchronous",
         ),
         ("marks", "triangle"),

@@ -67,9 +67,8 @@ def exercise(options: SimpleNamespace, _: ShowOptions) -> Result:
     """
     from cli.exercise import questions
     from cli.exercise.description import read_exercise
-    from cli.exercise.drawings import figure, moving
     from cli.exercise.recomputed import candidates
-    from cli.exercise.sheets import answers_csv, filled, key_table, sheet_page, solutions
+    from cli.exercise.sheets import answers_csv, figure, filled, key_table, moving, sheet_page, solutions
     from cli.exercise.variants import several, variants, workshop
     from cli.show.output import options_of
     from dalembert.results.result import Result

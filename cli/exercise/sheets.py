@@ -1,11 +1,15 @@
-"""The pages and tables of an exercise: a sheet for each student, solutions, answers and key."""
+"""The pages and tables of an exercise: a sheet for each student with its figure, solutions, answers and key."""
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cli.exercise.description import Answer, Ask, Exercise, Value, unit_text
 from cli.exercise.solving import DataTable, Workshop, cell_of
@@ -13,10 +17,14 @@ from cli.exercise.variants import Variant
 from dalembert.errors import DataError, quote
 from dalembert.figures import written
 from dalembert.hints import nearest
+from dalembert.page import Page
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.report import html_part, report, spelled
 from dalembert.results.text import csv_text
 from dalembert.units import parted
+
+if TYPE_CHECKING:
+    from virtualwork import Mechanism
 
 STYLE = """
 :root { color-scheme: light }
@@ -290,3 +298,100 @@ def _solution(variant: Variant, who: Sequence[str], drawing: str) -> Iterator[st
                 yield from map(html_part, parts)
     if result.method:
         yield f'<p class="small">{html.escape(result.method)}</p>\n'
+
+
+# --- the figure of a sheet, with nothing of the answers -----------------------------------------------------------------
+MOST, LETTERS = (500.0, 440.0), 15.0
+"""Width and height of a mechanism's figure, and the size of its letters, pixels."""
+
+
+def figure(variant: Variant) -> str:
+    """Return the figure of a sheet as HTML; empty where there is none."""
+    exercise = variant.problem.exercise
+    if exercise.figure is not None:
+        return _given(exercise.folder / exercise.figure)
+    if variant.problem.workshop.mechanism is not None:
+        return _mechanism(variant)
+    if exercise.command[0] == "balance":
+        return _rotor(variant)
+    return ""
+
+
+def moving(variant: Variant) -> str:
+    """Return the page that computes with this student's numbers, in a frame that opens on the sheet and is not printed."""
+    place = Path("page.html")
+    solved = variant.problem.result("--page", str(place))
+    with solved.result.within():
+        html_of = solved.result.beside[place]()
+    frame = Page(bytes(html_of).decode(), height=720).frame("allow-scripts allow-downloads allow-modals")
+    return f'<details class="page"><summary>The page that computes</summary>{frame}</details>\n'
+
+
+def _given(path: Any) -> str:
+    """The picture that the exercise names, within the page."""
+    data = path.read_bytes()
+    if path.suffix.lower() == ".svg":
+        text = data.decode("utf-8-sig", "replace")
+        if "<svg" not in text:
+            raise DataError(f"{path}: this is no SVG: expected an element svg")
+        kind = "image/svg+xml"
+    else:
+        kind = "image/png"
+    return f'<img alt="figure" src="data:{kind};base64,{base64.b64encode(data).decode()}">'
+
+
+def _mechanism(variant: Variant) -> str:
+    """Draw the mechanism of a variant in the pose asked for, to scale, as a notebook shows it."""
+    import numpy as np
+
+    from virtualwork.notebook_picture import svg
+
+    m = _varied(variant)
+    motion = m.motion(np.array([_pose(variant, m)]))
+    return svg(motion.poses, motion.drawing, most=MOST, letters=LETTERS) or ""
+
+
+def _varied(variant: Variant) -> Mechanism:
+    """The mechanism with the variant's dimensions."""
+    from cli.cases.axes import assigned
+
+    described = variant.problem.workshop.described
+    texts = variant.problem.parameters["set"]
+    m: Mechanism = assigned(described.mechanism, described.bare, texts) if texts else described.mechanism
+    return m
+
+
+def _pose(variant: Variant, m: Mechanism) -> Any:
+    """The inputs of the first pose or instant that is solved, SI; the guess's where there is none."""
+    document = variant.solved.document
+    listed: Any = document.get("poses") or document.get("time") or [{}]
+    first = listed[0] if isinstance(listed, list) else {}
+    each = first.get("inputs") or {"": first}
+    places = [
+        radians(entry[key]) if key.endswith("_deg") else entry[key]
+        for entry in each.values()
+        for key in ("input_deg", "angle_deg", "input_m", "position_m")
+        if key in entry
+    ]
+    if len(places) != len(m.inputs):
+        places = list(m.at)
+    return places[0] if len(places) == 1 else places
+
+
+def _rotor(variant: Variant) -> str:
+    """Draw a rotor's masses seen along its axis, and from the side where they have axial positions."""
+    import numpy as np
+
+    from balancing.rotor_svg import svg
+
+    read, chosen = variant.problem.known_masses()
+    table = read.table
+    if len(read.names) > 1:
+        return ""
+    names = table.texts.get("name") or [str(k) for k in range(1, table.rows + 1)]
+    radius = table.numbers["radius"].si if "radius" in table.numbers else np.ones(table.rows)
+    angle = np.angle(np.where(read.moment == 0, 1, read.moment))
+    if not chosen.several:
+        return svg(names, radius, angle)
+    at = np.zeros(len(chosen.name)) if chosen.z is None else chosen.z
+    return svg(names, radius, angle, read.z, chosen.name, at)
