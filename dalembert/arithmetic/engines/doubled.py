@@ -26,7 +26,7 @@ from dalembert.arithmetic.sines import WHOLE
 from dalembert.arithmetic.tape import EMPTY, Tape, performed
 
 # lanes from which writing a tape in floats pays, for numpy; and how many operations in floats one comes to, for compiled code
-PAYS, EACH = 1e4, 12.0
+PAYS, EACH = 2e4, 12.0
 # of the difference of two runs, and of the quantity: what the second run itself may be off by, far from singular places
 OWN, LAST = 1.01, 2.0**-96
 ZERO, TURN = Doubled(0.0), PI * 2.0
