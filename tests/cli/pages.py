@@ -43,10 +43,11 @@ class Opened:
             i,
         )
 
-    def press(self, key: str) -> None:
+    def press(self, key: str, shift: bool = False) -> None:
         self(
-            "document.body.dispatchEvent(new KeyboardEvent('keydown', {key: arguments[0], bubbles: true}))",
+            "document.body.dispatchEvent(new KeyboardEvent('keydown', {key: arguments[0], shiftKey: arguments[1], bubbles: true}))",
             key,
+            shift,
         )
 
     def text(self, element: str) -> str:

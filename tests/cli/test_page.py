@@ -106,6 +106,9 @@ def test_keys(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     ):
         opened.press(key)
         assert opened.pose() == pose
+    for key, pose in (("ArrowRight", 10), ("ArrowRight", 20), ("ArrowLeft", 10)):
+        opened.press(key, shift=True)
+        assert opened.pose() == pose
     speed = opened("return document.getElementById('speed').selectedOptions[0].textContent")
     opened.press("+")
     assert float(

@@ -38,6 +38,12 @@ def test_a_table_of_masses(dalembert: Dalembert, tmp_path: Path, browser: Any) -
             assert page.get(f"{plane}.angle") == pytest.approx(math.radians(row["angle_deg"]), rel=1e-12)
 
     hold(done.stdout)
+    for plane, arrow in zip("AB", page.paths("svg.polygon path.closing"), strict=True):
+        # counter-clockwise, where a screen's y points down
+        x, y = arrow[1] - arrow[0]
+        assert math.remainder(math.atan2(-y, x) - page.get(f"{plane}.angle"), 2 * math.pi) == pytest.approx(
+            0, abs=1e-3
+        )
     page.type("W1.radius", "3,5 cm")
     page.button("add a row")
     page.put(W3__weight=12.0, W3__radius=0.04, W3__angle=1.0, W3__z=0.05)
@@ -133,6 +139,13 @@ def test_a_machines_sheet(dalembert: Dalembert, tmp_path: Path, browser: Any) ->
     for i in (1, 2):
         angle = math.degrees(page.get(f"split.1.{i}.angle"))
         assert page.get(f"split.1.{i}.mass") == pytest.approx(split[round(angle)], rel=1e-9)
+        x, y = page(
+            f"const at = document.querySelectorAll('svg.dialled circle.on')[{i - 1}]; return [at.cx, at.cy].map((of) => of.baseVal.value)"
+        )
+        # counter-clockwise, where a screen's y points down
+        assert math.remainder(math.degrees(math.atan2(130 - y, x - 150)) - angle, 360) == pytest.approx(
+            0, abs=0.1
+        )
     # another session: an initial run, and a run with what was advised, whose trim the program finds too
     page.put(**{"initial/bearing/amplitude": 4.0, "initial/bearing/phase": 1.0})
     page.put(**{"run 2/bearing/amplitude": 0.8, "run 2/bearing/phase": 2.5})
