@@ -41,9 +41,14 @@ solveSheet = () => {
     const drawn = rotor.planes.map(() => []);
     for (const row of sheet.rows[r]) {
       const entry = { ...sums, radius: 1, z: 0 };
-      for (const { name } of sheet.columns) entry[name === sheet.amount ? "amount" : name] = values[cellName(rotor, row, name)];
+      const exact = {}; // as written: 180° is half a turn
+      for (const { name, unit } of sheet.columns) {
+        const x = values[cellName(rotor, row, name)];
+        const key = name === sheet.amount ? "amount" : name;
+        [entry[key], exact[key]] = [x, digitsOf(x, unit)];
+      }
       if (sheet.modes) Object.assign(entry, shapesAt(entry.z));
-      const out = solved(mass, names.mass, entry, { ...entry, ...pairs });
+      const out = solved(mass, names.mass, entry, { ...entry, ...exact, ...pairs });
       for (const name of Object.keys(sums)) [sums[name], pairs[name]] = [out.get(name)[0], out.get(name)[2]];
       rotor.planes.forEach((_, p) => drawn[p].push([row, out.get(`share ${p} x`)[0], out.get(`share ${p} y`)[0]]));
     }
@@ -63,7 +68,7 @@ solveSheet = () => {
       });
       for (const [name, x] of solved(made, names.made, { ...sums, ...put }, { ...pairs, ...put })) out.set(name, x);
     }
-    const set = (name, from, turn = false) => out.has(from) && answers.set(`${prefix(rotor)}${name}`, turn ? [whole(out.get(from)[0]), out.get(from)[1]] : out.get(from));
+    const set = (name, from, turn = false) => out.has(from) && answers.set(`${prefix(rotor)}${name}`, turn ? turned(out.get(from)) : out.get(from));
     rotor.planes.forEach((plane, p) => {
       set(`${plane}.unbalance`, `plane ${p} size`);
       set(`${plane}.mass`, `mass ${p}`);

@@ -65,17 +65,17 @@ solveSheet = () => {
     out = solved(solveTape, sheet.outputs, entering, entering);
   }
   if (!out) return;
-  const turned = (name) => [whole(out.get(name)[0]), out.get(name)[1]];
-  const phase = (name) => [whole((sheet.against ? -1 : 1) * out.get(name)[0]), out.get(name)[1]];
+  const angle = (name) => turned(out.get(name));
+  const phase = (name) => turned(out.get(name), sheet.against ? -1 : 1);
   sheet.planes.forEach((plane, p) => {
     answers.set(`${plane}.${word}`, out.get(`plane ${p} size`));
-    answers.set(`${plane}.angle`, turned(`plane ${p} angle`));
+    answers.set(`${plane}.angle`, angle(`plane ${p} angle`));
     const trim = last ? `trim ${last} ${p}` : `plane ${p}`;
     answers.set(`trim.${plane}.${word}`, out.get(`${trim} size`));
-    answers.set(`trim.${plane}.angle`, turned(`${trim} angle`));
+    answers.set(`trim.${plane}.angle`, angle(`${trim} angle`));
     if (last && sheet.sensors.every((_, s) => has(reading(last, s, "amplitude")))) {
       answers.set(`fresh.${plane}.${word}`, out.get(`fresh ${last} ${p} size`));
-      answers.set(`fresh.${plane}.angle`, turned(`fresh ${last} ${p} angle`));
+      answers.set(`fresh.${plane}.angle`, angle(`fresh ${last} ${p} angle`));
     }
     if (sheet.errors) {
       for (const [lead, from, size] of [["", p, `plane ${p} size`], ["trim.", last ? `${last} ${p}` : p, `${trim} size`]]) {

@@ -64,9 +64,12 @@ function shownAnswer(name, by = 1) {
 // a vector's size and angle; what is nothing has no angle
 function shownVector(name, what, by, angle) {
   const size = shownAnswer(`${name}${what}`, by);
-  return [size, Number(size) ? shownAnswer(`${name}${angle}`, Math.PI / 180) : "–"];
+  const turn = shownAnswer(`${name}${angle}`, Math.PI / 180);
+  return [size, Number(size) ? (turn === "360" ? "0" : turn) : "–"];
 }
 const whole = (x) => (x < 0 ? (x + 2 * Math.PI < 2 * Math.PI ? x + 2 * Math.PI : 0) : x + 0);
+// an angle from 0 to a whole turn, and its error: two computations may differ by a turn
+const turned = ([x, error], sense = 1) => [whole(sense * x), Math.min(error, Math.abs(2 * Math.PI - error))];
 // the outputs of a tape by their names, with how far 32 digits are from them
 function solved(tape, names, entering, twice) {
   const [out, more] = [tape.one(entering), tape.twice(twice)];

@@ -114,6 +114,33 @@ def test_rows_of_one_name_are_two(
     assert page.get("A.unbalance") == pytest.approx(unbalance, rel=1e-12)
 
 
+@pytest.mark.parametrize("angles", [(0, 180), (90, 270), (-90, 90), (0, 120, 240), (360, 540)])
+def test_masses_that_balance_each_other_leave_nothing(
+    angles: tuple[int, ...], dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
+    """Two masses opposite each other had a correction of 6e-16 g at 270°: the second computation had the same π."""
+    rows = [f"W{k},5,20,{angle}" for k, angle in enumerate(angles)]
+    page, unbalance = rotor(rows, dalembert, tmp_path, browser)
+    assert unbalance < 1e-19
+
+    def cells(row: str) -> list[str]:
+        return list(
+            page(
+                "return [...document.querySelectorAll('#answers tr')].filter((r) => r.cells[0].textContent ==="
+                " arguments[0]).map((r) => [...r.cells].slice(1).map((c) => c.textContent))[0]",
+                row,
+            )
+        )
+
+    assert cells("A") == ["0", "–", "0"]
+    assert cells("static, g·mm") == ["0", "–", "0"]
+    # a little more or less of one of them is no rounding
+    page.type("W0.mass", "5.000001")
+    assert cells("A") == ["0.000001", f"{(angles[0] + 180) % 360}", "0.00002"]
+    page.type("W0.mass", "4.999999")
+    assert cells("A") == ["0.000001", f"{angles[0] % 360}", "0.00002"]
+
+
 def test_a_mass_has_a_radius(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     """A mass at radius 0 was answered as no unbalance, and the program refused the copied rows; a row of zeros is none."""
     page, unbalance = rotor(["W1,5,20,30", "W2,7,20,100", "W3,0,0,0"], dalembert, tmp_path, browser)

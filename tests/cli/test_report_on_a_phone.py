@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cli.examples import EXAMPLES
 from tests.cli.pages import Opened
 from tests.conftest import Dalembert
 from tests.four_bars import body, four_bar
@@ -88,6 +89,31 @@ def test_a_customer_s_report_is_two_pages_of_a4(dalembert: Dalembert, tmp_path: 
     paper = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": False}
     printed = opened.browser.execute_cdp_cmd("Page.printToPDF", paper)
     assert b"/Count 2" in base64.b64decode(printed["data"])
+
+
+def test_a_line_is_printed_with_what_it_is_about(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
+    """The title of a polygon, or the line above a table, stood at the foot of a sheet, and the drawing or table on the next."""
+    rotor = (
+        "balance",
+        EXAMPLES / "rotor-batch" / "rotors.csv",
+        "--plane",
+        "A:0mm:60mm",
+        "--plane",
+        "B:90mm:60mm",
+    )
+    assert dalembert(*rotor, "--page", "page.html", "--report", "report.html").returncode == 0
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        styles = "return [...document.querySelectorAll(arguments[0])].map((e) => getComputedStyle(e)[arguments[1]])"
+        page = Opened(browser, tmp_path / "page.html")
+        assert page(styles, "figure", "breakInside") == ["avoid"] * 6
+        report = Opened(browser, tmp_path / "report.html")
+        above = report(styles, "p", "breakAfter")
+        # of all lines those alone that stand above a table
+        assert above.count("avoid") == report("return document.querySelectorAll('p + .wide').length") > 0
+        assert "auto" in above
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
 
 @pytest.mark.slow
