@@ -187,7 +187,8 @@ def _step(phi: Reals, force: Complexes, per: Complexes, arms: Reals) -> Reals:
     turned = np.divide(force.conj(), size, out=np.zeros_like(force), where=size > 0)
     slopes = np.eye(len(arms))[:, :, None] + arms[:, None] * (turned[:, None] * per.transpose(1, 0, 2)).real
     step = solve(np.moveaxis(slopes, 2, 0), -(phi + arms * size).T).T
-    return np.where(np.isfinite(step), step, 0.0)
+    # what does not rub, or not slide, has no friction, whatever rounding leaves
+    return np.where(np.isfinite(step) & (arms != 0), step, 0.0)
 
 
 def balanced(arms: Reals, p: Complexes, q: Complexes) -> Reals | None:

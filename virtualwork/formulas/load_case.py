@@ -118,11 +118,13 @@ class LoadCase:
                 raise DescriptionError(
                     f"[[friction]] {i} joint: '{entry.joint}' is no joint: nothing is pinned or guided there"
                 )
-            for joint in here:
+            pins, guides = ([x for x in here if (x.guide is None) == pin] for pin in (True, False))
+            # with a radius the pin rubs, without one the guide, where the point has both
+            for joint in (pins or guides) if entry.radius else (guides or pins):
                 if joint.guide is not None:
                     g = m.guides[joint.guide]
                     result.append((joint, g.link, g.on, entry.coefficient, entry.radius))
-                elif entry.radius or len(here) == 1:
+                else:
                     first, *others = joint.bodies
                     result += [(joint, body, first, entry.coefficient, entry.radius) for body in others]
         return result

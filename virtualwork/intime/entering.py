@@ -174,7 +174,7 @@ def _one(x: Any) -> float:
 # --- loads given by tables ------------------------------------------------------------------------------------------
 # of a table's span: how far beyond its ends it is read, for a step may reach there by its rounding
 EDGE = 1e-12
-# of a turn, or of the size: what a step passes at most where it does not meet kinks
+# in a turn of an input, or on a way of 2π sizes of a slide: places that no step passes where it does not meet kinks
 PACES = 36
 # rad: how far a cam is from the end of a segment when it has left it, for its acceleration may have a step there
 LEAVES = 1e-5
@@ -260,19 +260,14 @@ def ends_of_law(drive: CamDrive, plan: Plan, name: str) -> Watch | None:
 
 def paces(scale: Floats) -> list[Watch]:
     """Places of every input that no step may pass, where kinks cannot be met: no step is longer than from one to the next."""
-    each = [size / PACES if size != 1.0 else TURN / PACES for size in scale]
-    return [
-        Watch(
-            f"pace {j}",
-            lambda t, q, v, j=j: q[j],
-            lambda t, q, v, a, j=j: v[j],
-            [0.0],
-            pace,
-            linear=True,
-            noise=LEAVES,
+
+    def pace(j: int, size: float) -> Watch:
+        way, noise = TURN / PACES * size, LEAVES * size
+        return Watch(
+            f"pace {j}", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [0.0], way, linear=True, noise=noise
         )
-        for j, pace in enumerate(each)
-    ]
+
+    return [pace(j, size) for j, size in enumerate(scale)]
 
 
 def ends(load: Tabled, plan: Plan, t: float, q: Floats, v: Floats) -> str:
