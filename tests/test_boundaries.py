@@ -209,13 +209,10 @@ def imports(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, str | None]]:
 @cache
 def graph() -> dict[str, set[str]]:
     """Return the files that each file imports."""
-    found: dict[str, set[str]] = {}
+    found = {}
     for module, file in files().items():
-        to = {
-            (module_named(f"{name}.{part}") if part else None) or module_named(name)
-            for name, part in file.imports
-        }
-        found[module] = {other for other in to if other is not None}
+        to = (part and module_named(f"{name}.{part}") or module_named(name) for name, part in file.imports)
+        found[module] = {other for other in to if other}
     return found
 
 
