@@ -211,7 +211,7 @@ def graph() -> dict[str, set[str]]:
     """Return the files that each file imports."""
     found = {}
     for module, file in files().items():
-        to = (part and module_named(f"{name}.{part}") or module_named(name) for name, part in file.imports)
+        to = ((part and module_named(f"{name}.{part}")) or module_named(name) for name, part in file.imports)
         found[module] = {other for other in to if other}
     return found
 
