@@ -392,9 +392,7 @@ def modules_after(*arguments: str) -> set[str]:
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("--help",),
-        ("--version",),
-        ("examples",),
+        *[("--help",), ("--version",), ("examples",)],
         *((name, "--help") for name in ("balance", "index", "work", "spin", "grade")),
     ],
 )
@@ -427,11 +425,11 @@ def test_a_check_of_inertias_loads_no_mechanism(tmp_path: Path) -> None:
 def test_no_file_has_the_name_of_something_in_its_packages_own_file() -> None:
     """Importing `cli.rotor.index` would put the file in the place of the function `index`."""
     for module, tree in trees().items():
-        if module.endswith(".__init__") and module.startswith("cli."):
+        if module.startswith("cli.") and module.endswith(".__init__"):
             files = {name.split(".")[-1] for name in trees() if name.rpartition(".")[0] == module[:-9]}
-            named = {part for node in tree.body if isinstance(node, ast.ImportFrom) for part in node.names}
-            here = {part.asname or part.name for part in named}
-            here |= {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+            here = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+            imported = (part for node in tree.body if isinstance(node, ast.ImportFrom) for part in node.names)
+            here |= {part.asname or part.name for part in imported}
             assert not files & here, module
 
 
