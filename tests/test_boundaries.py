@@ -394,7 +394,13 @@ def modules_after(*arguments: str) -> set[str]:
     return set(json.loads(done.stderr.splitlines()[-1]))
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("--version",), ("examples",), ("balance", "--help")])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *[("--help",), ("--version",), ("examples",)],
+        *((name, "--help") for name in ("balance", "index", "work", "spin", "grade")),
+    ],
+)
 def test_help_loads_nothing_heavy(arguments: tuple[str, ...]) -> None:
     loaded = modules_after(*arguments)
     assert "typer" in loaded
