@@ -403,7 +403,9 @@ class Friction(Part):
     joint: str = declared(PointName(), "the point of the pin or guide")
     coefficient: float = declared(Scalar("number", negative=False), "the coefficient of friction")
     radius: float = declared(
-        Scalar("length", negative=False), "the radius of the pin; 0 for the guide of a point that has both", default=0.0
+        Scalar("length", negative=False),
+        "the radius of the pin; 0 for the guide of a point that has both",
+        default=0.0,
     )
 
 
