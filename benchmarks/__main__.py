@@ -159,7 +159,9 @@ def stress(options: SimpleNamespace, _: ShowOptions) -> Result:
         "worst_error_over_estimate": [t.worst for t in tallies],
         "worst_seed": [t.seed for t in tallies],
         "share_bounded": [t.bounded for t in tallies],
+        "slack_of_1_percent": [t.slacks(0.01)[0] for t in tallies],
         "median_slack": [t.slack for t in tallies],
+        "slack_of_99_percent": [t.slacks(0.99)[0] for t in tallies],
     }
     return Result(
         document=lambda: {"campaigns": _records(columns)},

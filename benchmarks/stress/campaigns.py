@@ -59,8 +59,12 @@ class Tally:
     @property
     def slack(self) -> float:
         """The median of estimate over error, among answers that have an error."""
-        errors = [ratio for ratio in self.ratios if ratio > 0]
-        return float(np.median(1 / np.array(errors))) if errors else 1.0
+        return self.slacks(0.5)[0]
+
+    def slacks(self, *shares: float) -> list[float]:
+        """The estimate over the error that shares of the answers with an error do not exceed."""
+        errors = np.array([ratio for ratio in self.ratios if ratio > 0] or [1.0])
+        return [float(x) for x in np.quantile(1 / errors, shares)]
 
 
 def campaigns() -> dict[str, tuple[str, Trial]]:

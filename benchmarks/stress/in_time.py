@@ -9,8 +9,8 @@ import mpmath as mp
 import numpy as np
 
 from benchmarks.stress.pairs import Pairs
-from benchmarks.truth import double_pendulum
-from virtualwork import Gear, Guide, Input, Link, Mechanism, Spring, Torque
+from benchmarks.truth import double_pendulum, falling_four_bar
+from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism, Spring, Torque
 from virtualwork.intime.run import Run
 
 G, DIGITS = 9.81, 50
@@ -134,10 +134,39 @@ def _double_pendulum(rng: np.random.Generator) -> Pairs:
     return pairs
 
 
+def _falling_four_bar(rng: np.random.Generator) -> Pairs:
+    """A crank-rocker from rest at any crank angle above, at a time and some accuracies: by its energy, as a quadrature."""
+    a, b, c, d = (float(getattr(falling_four_bar, x)) for x in ("CRANK", "COUPLER", "ROCKER", "BASE"))
+    parts = zip(
+        ("A B", "B C", "D C"), (a, b, c), falling_four_bar.MASSES, falling_four_bar.INERTIAS, strict=True
+    )
+    links = {
+        names.replace(" ", ""): Link(
+            {names[0]: 0j, names[2]: complex(x)},
+            mass=float(mass),
+            center=complex(x / 2),
+            inertia=float(inertia),
+        )
+        for names, x, mass, inertia in parts
+    }
+    at = float(rng.uniform(0.4, 1.4))
+    guess = Guess(np.pi / 3, {"BC": 0.47, "DC": 1.73})
+    m = Mechanism(
+        {"A": 0j, "D": complex(d)}, links, inputs=Input(link="AB", value=at), guess=guess, gravity=-1j * G
+    )
+    end = float(rng.uniform(0.3, 3.0))
+    exact = falling_four_bar.angle(mp.mpf(end), mp.mpf(at), 20, 160)
+    pairs: Pairs = []
+    for accuracy in (10.0 ** rng.uniform(-12, -2, 4)).tolist():
+        pairs += _pairs(m.simulate([0, end], angle=at, accuracy=accuracy), lambda _: exact)
+    return pairs
+
+
 CAMPAIGNS = {
     "pendulum in time": ("any start and accuracy, against elliptic functions", _pendulum),
     "damped oscillator in time": ("from swinging to stiff, against its exponentials", _oscillator),
     "stiff oscillator in time": ("to rest and long after, against its exponentials", _stiff),
     "geared wheels in time": ("constant torques, against their parabola", _wheels),
+    "four-bar in time": ("from any height, against a quadrature by its energy", _falling_four_bar),
     "double pendulum in time": ("any start, against Taylor series of 40 digits", _double_pendulum),
 }

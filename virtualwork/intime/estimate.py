@@ -1,15 +1,13 @@
-"""How large the error of an answer is, from a second solution whose steps are halves of the first one's.
+"""How large the error of an answer is, from what its steps are off by, or from a second solution in steps twice as long.
 
-The errors of the steps add up, and the motion itself makes them grow. With steps half as long those of a method of
-order 8 add up to 1/256 of what they were (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations
-I, §II.4 and II.8), so the distance of the two solutions is 255 times the error of the finer one. The estimate is ten
-times what follows, for the steps are not small without end; rounding, which halves do not make smaller, is added, as the
-motion makes it grow (`growth`).
+The errors of the steps (`defect`) add up as the motion makes them grow (`growth`), and so does what they have rounded. Where the
+motion is not smooth, or a step is longer than what it follows (a stiff damper), steps half as long tell: the errors of a method of
+order 8 add up to 1/256 of what they were (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, §II.4 and
+II.8), so the distance of the two solutions is 255 times the error of the finer one. There the estimate is ten times what follows,
+for the steps are not small without end.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -19,8 +17,9 @@ from virtualwork.intime.travel import Travel
 # the tolerance of a step over the requested accuracy; the accuracy beyond which steps are so long that halves gain less than
 # the method's order
 FIRST, COARSE = 0.1, 1e-7
-# what the error of steps half as long is less by, one; of the estimate
-GAIN, SAFETY, ALONE = 255.0, 4.0, 10.0
+# what the error of steps half as long is less by, one; of the estimate by the errors of the steps; of that by the distance of two
+# solutions, beside the former and alone
+GAIN, SAFETY, BOTH, ALONE = 255.0, 2.0, 8.0, 10.0
 # the tolerance below which steps have errors of rounding alone
 LEAST = 1e-15
 # an error of the inputs beyond which nothing is known of what depends on them
@@ -38,32 +37,6 @@ def first_tolerance(accuracy: float, crosses: bool = False) -> float:
     return max(LEAST, FIRST * (accuracy if crosses else min(accuracy, COARSE)))
 
 
-def share(followed: bool) -> float:
-    """Of the distance of two solutions what the finer may err by; less where their distance over each step is `followed` too.
-
-    >>> round(share(True), 4), round(share(False), 4)
-    (0.0157, 0.0392)
-    """
-    return (SAFETY if followed else ALONE) / GAIN
-
-
-def apart(t: Reals, q: Reals, v: Reals) -> Reals:
-    """How far two solutions lie apart at times (…, n), from the differences of their inputs and speeds, (…, n, k).
-
-    They may meet by chance and be at different speeds: what these come to within a step counts as well.
-
-    >>> apart(np.array([0.0, 0.5]), np.array([[0.0], [0.0]]), np.array([[0.0], [2e-9]])).tolist()
-    [[0.0], [1e-09]]
-    """
-    step = np.diff(t, axis=-1, prepend=t[..., :1])[..., None]
-    return np.asarray(np.maximum(np.abs(q), step * np.abs(v)))
-
-
-def spread(fine: Reals, apart: Reals, of: Any) -> Reals:
-    """The error of a quantity over times, the last axis but the inputs', from how far two solutions lie apart: the largest so far, and its rounding."""
-    return np.asarray(np.maximum.accumulate(apart * of, axis=-2) + 4 * EPS * np.abs(fine))
-
-
 def infinite_where_lost(error: Reals, scale: Reals) -> Reals:
     """The errors of the inputs, (n, k); infinite where no digit holds, for two solutions that have parted may be whole turns off.
 
@@ -73,26 +46,47 @@ def infinite_where_lost(error: Reals, scale: Reals) -> Reals:
     return np.where((error / scale).max(axis=-1, keepdims=True) > UNKNOWN, np.inf, error)
 
 
-# --- of two solutions ---------------------------------------------------------------------------------------------
-def input_error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
-    """How far the inputs may be from the truth at times, (n, k): between two nodes that of the one after both, for in a single step halves gain by chance."""
-    nodes = coarse.nodes[coarse.nodes <= fine.end]
-    error = spread(*solutions_apart(fine, coarse, nodes)[:2], part) + besides(fine, coarse, nodes, part)
+def apart(t: Reals, q: Reals, v: Reals) -> Reals:
+    """How far two solutions lie apart at times (n,), from the differences of their inputs and speeds, (n, k).
+
+    They may meet by chance and be at different speeds: what these come to within a step counts as well.
+
+    >>> apart(np.array([0.0, 0.5]), np.array([[0.0], [0.0]]), np.array([[0.0], [2e-9]])).tolist()
+    [[0.0], [1e-09]]
+    """
+    return np.asarray(np.maximum(np.abs(q), np.diff(t, prepend=t[:1])[:, None] * np.abs(v)))
+
+
+def share(fine: Travel, coarse: Travel) -> float:
+    """Of the distance of two solutions what the finer may err by beside the errors of its steps.
+
+    Where these say all, nothing; where a loop nearly folds quantities change fast within a step, and where steps pass kinks halves gain little.
+    """
+    rough = coarse.rough or fine.rough
+    if fine.judged:
+        return BOTH / GAIN if rough else 0.0
+    return 1.0 if rough or coarse.legs[0].equations.crosses else ALONE / GAIN
+
+
+def errors(fine: Travel, coarse: Travel, t: Reals) -> tuple[Reals, Reals]:
+    """How far the inputs and their speeds may be from the truth at times, (n, k) each: between two nodes that of the one after both, for within a step it may be larger than at its ends."""
+    nodes, rounded, stepped = fine.off
+    (q, v, *_), part = fine.at(nodes), share(fine, coarse)
+    error, rates = np.split(rounded + SAFETY * stepped, 2, axis=1)
+    error = error + fine.blur(nodes)[:, None] + 4 * EPS * np.abs(q)
+    if part:
+        other, rate, *_ = coarse.at(nodes)
+        gap, faster = (
+            np.maximum.accumulate(x) for x in (apart(nodes, q - other, v - rate), np.abs(v - rate))
+        )
+        rates = np.maximum(rates, faster * np.divide(error, gap, out=np.zeros_like(gap), where=gap > 0))
+        error, rates = error + part * gap, rates + part * faster
     after = np.searchsorted(nodes, t)
-    return np.asarray(error[np.minimum(after + (after > 0), len(nodes) - 1)])
+    rows = np.minimum(after + (after > 0), len(nodes) - 1)
+    return error[rows], rates[rows]
 
 
-def solutions_apart(fine: Travel, coarse: Travel, nodes: Reals) -> tuple[Reals, Reals, Reals]:
-    """The inputs of the finer solution at nodes of the coarser, how far the two lie apart there, and their speeds, (n, k) each."""
-    (q, v, *_), (other, rate, *_) = fine.at(nodes), coarse.at(nodes)
-    return q, apart(nodes, q - other, v - rate), np.abs(v - rate)
-
-
-def besides(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
-    """What is off besides a part of their distance, (n, k): for rounding, and where small changes are followed, for their distance over each step."""
-    return np.asarray(fine.grown(t, part if coarse.followed else 0.0) + fine.blur(t)[:, None])
-
-
-def unavoidable(fine: Travel, t: Reals) -> Reals:
+def unavoidable(fine: Travel) -> Reals:
     """The error that no shorter steps make smaller, (n, k): rounding, as the motion makes it grow, and interpolation near change points."""
-    return np.asarray(fine.grown(t) + fine.blur(t)[:, None])
+    nodes, rounded, _ = fine.off
+    return np.asarray(rounded[:, : rounded.shape[1] // 2] + fine.blur(nodes)[:, None])

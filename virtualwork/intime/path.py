@@ -16,9 +16,10 @@ from virtualwork.describe import MechanismError
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import unwound
 from virtualwork.intime.coordinates import Coordinates
+from virtualwork.intime.defect import step_errors
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import TINY, DormandPrince
-from virtualwork.intime.growth import Rounded, at_start, differences, flows, free, grown, ways_of
+from virtualwork.intime.growth import Off, at_start, flows, free, grown, ways_of
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.marching import Nodes, loop, over
 from virtualwork.intime.watch import Floats
@@ -89,9 +90,8 @@ class Path:
     def cut(self, node: int) -> None:
         """Take away a node and all after it, but for the first."""
         del self.rows[max(1, node) :]
-        # it is that of every step
-        for kept in ("noise", "_flows"):
-            self.__dict__.pop(kept, None)
+        # it is that of all nodes
+        self.__dict__.pop("_noise", None)
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
@@ -160,8 +160,8 @@ class Path:
         return np.unique(np.linspace(0, self.steps, min(SAMPLES, 2 + self.steps // 4)).astype(int))
 
     @cached_property
-    def noise(self) -> Reals:
-        """The standard deviation of what rounding makes of the accelerations over each step, (n − 1, k), from that at some nodes.
+    def _noise(self) -> tuple[Reals, Reals]:
+        """The standard deviation of what rounding makes of the accelerations at some nodes, its logarithm (n, k), and their times.
 
         Of values at places so near each other a fourth difference has nothing but rounding in it; of five that round by
         themselves its square is 70 times theirs. The accelerations themselves do not tell: the pull of a spring of 10 m
@@ -178,70 +178,73 @@ class Path:
         squares = np.square(np.diff(rates, 4, axis=0)).mean(axis=0) / 70
         # none where a place beside a node cannot be assembled; near a pole it grows by powers of ten
         sizes = np.sqrt(np.where(np.isfinite(squares), squares, 0.0))
-        sizes = np.log(np.maximum(np.maximum(sizes, np.median(sizes, axis=0)), TINY))
-        steps = np.arange(self.steps) + 0.5
-        return np.asarray(np.exp(np.stack([np.interp(steps, which, of) for of in sizes.T], axis=1)))
+        return np.log(np.maximum(np.maximum(sizes, np.median(sizes, axis=0)), TINY)), some.t
 
-    @cached_property
-    def noise_of_speeds(self) -> Reals:
-        """What rounding of the accelerations may make of the speeds over each step, (n − 1, k).
+    def noise_of_speeds(self, t: Reals) -> Reals:
+        """What rounding of the accelerations may make of the speeds over each step between times (n,), (n − 1, k).
 
         A step takes each stage with its weight, and each of them rounds by itself.
         """
-        h = np.diff(self.nodes.t)[:, None]
-        return np.asarray(DEVIATIONS * self.noise * float(np.linalg.norm(self.method.stages[1])) * h)
+        (sizes, times), middle = self._noise, 0.5 * (t[1:] + t[:-1])
+        noise = np.exp(np.stack([np.interp(middle, times, of) for of in sizes.T], axis=1))
+        weight = DEVIATIONS * float(np.linalg.norm(self.method.stages[1]))
+        return np.asarray(weight * noise * np.diff(t)[:, None])
 
-    @property
-    def _sizes(self) -> Reals:
-        """What the loads add to the accelerations, summed without signs, (k, n), from that at some nodes."""
-        t, some = self.nodes.t, self.nodes.at(self._which)
+    def _sizes(self, t: Reals) -> Reals:
+        """What the loads add to the accelerations, summed without signs, (k, n) at times, from that at some nodes."""
+        some = self.nodes.at(self._which)
         sizes = self.equations.load_sizes(some.t, some.q, some.v)
         return np.stack([np.interp(t, some.t, of) for of in sizes.T])
-
-    @property
-    def _stiff(self) -> bool:
-        """Whether what is off shrinks within a step by far."""
-        return self.followed and self.method.stable == np.inf
 
     @property
     def followed(self) -> bool:
         """Whether small changes are followed along the motion, which is smooth (see `Equations.smooth`); those of the inputs, if not."""
         return self.equations.smooth
 
-    @cached_property
-    def _flows(self) -> tuple[Reals, Reals, Reals]:
-        """The flows of small changes over each step, what rounds at random in it, and what it changes; see `growth.grown`."""
-        nodes, equations, k = self.nodes, self.equations, self.equations.k
-        noise, h = self.noise_of_speeds.T, np.diff(nodes.t)
+    @property
+    def judged(self) -> bool:
+        """Whether the steps are judged by their defect: an implicit method's may be too long for it, and what passes a kink has none."""
+        return self.followed and not self.stiff and None not in self.equations.kinks
+
+    @property
+    def stiff(self) -> bool:
+        """Whether the steps are those of an implicit method."""
+        return self.method.stable == np.inf
+
+    def off(self, t: Reals, start: Off | None) -> tuple[Reals, Reals, Off]:
+        """What inputs and their speeds are off by at times t (n,) from the first node to the last, for rounding and for the errors of the steps, (2k, n) each; and the last state, by `start`, that of the first.
+
+        Between two of the times there is at least one step, or better two of one length.
+        """
+        equations, k, h = self.equations, self.equations.k, np.diff(t)
+        noise, sizes = self.noise_of_speeds(t).T, self._sizes(t)
+        every = np.concatenate([t, 0.5 * (t[1:] + t[:-1])])
+        every.sort()
+        q, v, a = (x.T for x in (self.at(every) if self.followed else self.states(every))[:3])
+        start = at_start(q[:, 0], v[:, 0]) if start is None else start
+        ways = ways_of(h, q[:, ::2], v[:, ::2], sizes)
         if not self.followed:
             # nothing pulls back or apart, and all is off one way
-            q, v, a = (x.T for x in self.states(nodes.t)[:3])
-            rates = np.abs(np.concatenate([v, a]))
-            ways = 0.5 * h * (rates[:, 1:] + rates[:, :-1])
-            return free(h, k), noise, np.concatenate([ways, ways_of(h, q, v, self._sizes)[2 * k :]])
-        q, v, a = (x.T for x in (nodes.q, nodes.v, nodes.rates[:, :k]))
+            rates = np.abs(np.concatenate([v, a]))[:, ::2]
+            ways[: 2 * k] = 0.5 * h * (rates[:, 1:] + rates[:, :-1])
+            result = grown(free(h, k), h, noise, ways, start)
+            return result.rounded, result.stepped, result.at(-1)
 
         def many(t: Reals, q: Reals, v: Reals) -> Reals:
             return equations.many(t, q.T, v.T)[:, :k].T
 
-        flow, rounds = flows(
-            many, np.array(equations.scale), nodes.t, q, v, a, not equations.stops, self._stiff
-        )
-        return flow, np.hypot(noise, rounds), ways_of(h, q, v, self._sizes)
-
-    def grown(self, start: Rounded | None, apart: Reals | None = None) -> tuple[Reals, Rounded]:
-        """How far the inputs may be off for what rounds in all steps before, (n, k), and what has rounded in the last state.
-
-        `start` is that of the first state; `apart` how far another solution lies from the nodes, (2k, n): by how much the two part
-        over each step counts too.
-        """
-        nodes = self.nodes
-        start = at_start(nodes.q[0], nodes.v[0]) if start is None else start
-        flow, rounds, ways = self._flows
-        local = None if apart is None else differences(flow, apart)
-        seen = None if self.coordinates.own or not self.followed else self.coordinates.seen(nodes.q)
-        off, last = grown(flow, np.diff(nodes.t), rounds, ways, start, seen, local, self._stiff)
-        return off.T, last
+        motion, stiff = (every, q, v, a), self.stiff
+        flow, rounds, slopes = flows(many, np.array(equations.scale), *motion, not equations.stops, stiff)
+        local = step_errors(many, slopes, *motion) if self.judged else 0.0
+        result = grown(flow, h, np.hypot(noise, rounds), ways, start, local, stiff)
+        last = result.at(-1)
+        if not self.coordinates.own:
+            seen = self.coordinates.seen(q[:, ::2].T)
+            none = np.zeros_like(seen)
+            turning = np.gradient(seen, t, axis=2) if len(t) > 1 else none
+            rows = (seen, none), (turning, seen)
+            result = result.onto(np.concatenate([np.concatenate(row, axis=1) for row in rows]))
+        return result.rounded, result.stepped, last
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property

@@ -25,12 +25,10 @@ from virtualwork.intime.estimate import (
     LEAST,
     TRIES,
     UNKNOWN,
-    besides,
+    errors,
     first_tolerance,
     infinite_where_lost,
-    input_error,
     share,
-    solutions_apart,
     unavoidable,
 )
 from virtualwork.intime.explicit import DormandPrince
@@ -80,7 +78,6 @@ class Run:
     error_estimate: Reals = field(repr=False)
     fine: Travel = field(repr=False)
     coarse: Travel = field(repr=False)
-    share: float = field(repr=False)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -122,14 +119,11 @@ class Run:
         nodes = np.setdiff1d(self.coarse.nodes[self.coarse.nodes <= self.fine.end], self.coarse.jumps)
         some = nodes[np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), NODES)).astype(int))]
         t = np.union1d(some, self.t)
-        q, gap, faster = solutions_apart(self.fine, self.coarse, t)
-        least, gap, faster = (
-            besides(self.fine, self.coarse, t, self.share),
-            *(np.maximum.accumulate(x, axis=0) for x in (gap, faster)),
+        q, (wrong, rates), part = (
+            self.fine.at(t)[0],
+            errors(self.fine, self.coarse, t),
+            share(self.fine, self.coarse),
         )
-        shares = self.share + np.divide(least, gap, out=np.zeros_like(gap), where=gap > 0)
-        wrong, rates = gap * self.share + least + 4 * EPS * np.abs(q), faster * shares
-        most = np.minimum(shares.max(axis=1), 1.0)
         units = np.eye(q.shape[1])
         moves = [(wrong * unit, 0.0 * rates) for unit in units] + [
             (0.0 * wrong, rates * unit) for unit in units
@@ -139,7 +133,7 @@ class Run:
         answers, moved = of(self.fine, t, None), [of(self.fine, t, by) for by in moves]
         rows, result = np.searchsorted(t, self.t), []
         for answer, other, *others in zip(answers, of(self.coarse, t, None), *moved, strict=True):
-            error = most * np.maximum.accumulate(np.abs(answer - other)) + 4 * EPS * np.abs(answer)
+            error = part * np.maximum.accumulate(np.abs(answer - other)) + 4 * EPS * np.abs(answer)
             off = np.abs(np.array(others) - answer)
             # a quantity rounds by itself, also where it vanishes
             rounded = np.maximum.accumulate(off[-len(ROUNDINGS) :].max(axis=0))
@@ -303,30 +297,29 @@ def _simulated(
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
-        part = 1.0 if equations.crosses or coarse.rough or fine.rough else share(coarse.followed)
         times = reached(t, fine.end)
-        error = input_error(fine, coarse, times, part)
+        error, _ = errors(fine, coarse, times)
         worst = float((error / scale).max())
         if worst <= accuracy or tolerance <= lowest or finer < lowest or fine.steps > MOST / 2:
             break
-        least = float((unavoidable(fine, fine.nodes) / scale).max())
+        least = float((unavoidable(fine) / scale).max())
         if worst <= 2 * least and least <= UNKNOWN:
             # shorter steps gain little
             break
         tolerance = finer
-    if fine.ended == "end" and _arrives(fine, coarse, levels, part):
+    if fine.ended == "end" and _arrives(fine, coarse, levels):
         fine.ended = "until"
     _refuse_lost_energy(fine, max(accuracy, worst))
-    run = Run(assembly, times, *fine.at(times), infinite_where_lost(error, scale), fine, coarse, part)
+    run = Run(assembly, times, *fine.at(times), infinite_where_lost(error, scale), fine, coarse)
     return replace(run, warnings=(*equations.warnings, *_warnings(run, accuracy, worst, until, t)))
 
 
-def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:
+def _arrives(fine: Travel, coarse: Travel, levels: Levels) -> bool:
     """Whether an input comes to its level at the last time, but for the error of the motion."""
     if not levels:
         return False
     t = fine.nodes
-    gap, error = fine.at(t)[0], input_error(fine, coarse, t, part)
+    gap, (error, _) = fine.at(t)[0], errors(fine, coarse, t)
     for j, level in levels.items():
         beside = np.abs(gap[:, j] - level) <= error[:, j]
         if beside[-1] and not beside.all():

@@ -111,7 +111,7 @@ def gains(path: Path, fastest: float) -> tuple[float, tuple[int, str] | None]:
 
     rows = wrong(np.full_like(at, TOGETHER * fastest))
     if rows.any():
-        rows = wrong(TOGETHER * fastest + _rounded(equations, nodes, path.noise_of_speeds))
+        rows = wrong(TOGETHER * fastest + _rounded(equations, nodes, path.noise_of_speeds(nodes.t)))
     if not rows.any():
         return fastest, None
     node = int(np.argmax(rows.any(axis=0)))

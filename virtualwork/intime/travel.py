@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +16,7 @@ from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
 from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
-from virtualwork.intime.growth import Rounded
+from virtualwork.intime.growth import Off
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.sticking import gains, holding, rests
@@ -43,8 +43,7 @@ class Travel:
 
     legs: list[Path] = field(default_factory=list)
     ended: str = ""
-    # the solution in steps twice as long, whose nodes tell well enough how the motion makes what rounds grow; its own where
-    # there is none
+    # the solution in steps twice as long, where there is one
     coarse: Travel | None = None
 
     @property
@@ -128,37 +127,32 @@ class Travel:
         return np.interp(times, np.concatenate(t), np.concatenate(places))
 
     @property
-    def followed(self) -> bool:
-        """Whether small changes are followed along all of it, in the inputs, by explicit steps."""
-        leg = self.legs[0]
-        return len(self.legs) == 1 and leg.followed and leg.coordinates.own and leg.method.stable < np.inf
+    def judged(self) -> bool:
+        """Whether the steps of all legs are judged by their defect."""
+        return all(leg.judged for leg in self.legs)
 
-    def grown(self, times: Reals, share: float = 0.0) -> Reals:
-        """What the motion makes of the rounding of all steps before, the largest so far, at times between nodes too, (n, k).
-
-        With a share of them, by how much the coarse solution parts from this one over each step counts too.
-        """
-        way = self.coarse or self
-        sizes: list[Reals] = []
-        rounded: Rounded | None = None
-        for before, leg in zip([None, *way.legs], way.legs, strict=False):
-            if before is not None and rounded is not None and before.followed and leg.followed:
+    @cached_property
+    def off(self) -> tuple[Reals, Reals, Reals]:
+        """Times between steps of the coarse solution (n,); what the motion has made of the rounding of all steps before, and of their errors: of inputs and speeds, the largest so far, (n, 2k)."""
+        between = (self.coarse or self).nodes
+        times: list[Reals] = []
+        offs: list[list[Reals]] = [[], []]
+        last: Off | None = None
+        for before, leg in zip([None, *self.legs], self.legs, strict=False):
+            if before is not None and last is not None and before.followed and leg.followed:
                 _, q, v, *_ = before.last
-                rounded = rounded.onto(before.coordinates.onto(leg.coordinates, q, v))
-            size, rounded = leg.grown(rounded, share * self._apart(leg) if share else None)
-            sizes.append(size)
-        largest = np.maximum.accumulate(np.concatenate(sizes), axis=0)
-        largest = np.minimum(largest, self.legs[0].equations.scale)
-        nodes = np.concatenate([leg.nodes.t for leg in way.legs])
-        return np.stack([np.interp(times, nodes, of) for of in largest.T], axis=1)
-
-    def _apart(self, leg: Path) -> Reals:
-        """How far this solution lies from the nodes of a leg of the coarse one, (2k, n); after its end as far as there."""
-        nodes = leg.nodes
-        n = int(np.searchsorted(nodes.t, self.end, side="right"))
-        q, v, *_ = self.at(nodes.t[:n])
-        apart = np.concatenate([q - nodes.q[:n], v - nodes.v[:n]], axis=1).T
-        return np.pad(apart, ((0, 0), (0, len(nodes.t) - n)), mode="edge")
+                last = last.onto(before.coordinates.onto(leg.coordinates, q, v))
+            begin, end = leg.rows[0][0], leg.end
+            inner = between[(between > begin) & (between < end)]
+            t = np.concatenate([[begin], inner, [end][: leg.steps]])
+            *parts, last = leg.off(t, last)
+            times.append(t)
+            for of, x in zip(offs, parts, strict=True):
+                of.append(x.T)
+        rounded, stepped = (np.maximum.accumulate(np.concatenate(of), axis=0) for of in offs)
+        k, scale = self.legs[0].equations.k, self.legs[0].equations.scale
+        rounded[:, :k] = np.minimum(rounded[:, :k], scale)
+        return np.concatenate(times), rounded, stepped
 
     @property
     def halves(self) -> Floats:

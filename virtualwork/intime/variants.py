@@ -23,12 +23,13 @@ from virtualwork.describe import MechanismError
 from virtualwork.family.family import Family, FamilyMotion
 from virtualwork.family.part import Part, Solver
 from virtualwork.family.varied_formulas import VariedFormulas
-from virtualwork.formulas.numbers import Reals, real_array
+from virtualwork.formulas.numbers import EPS, Reals, real_array
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
+from virtualwork.intime.defect import step_errors
 from virtualwork.intime.ends import events, passed, sides
-from virtualwork.intime.estimate import GAIN, LEAST, TRIES, apart, first_tolerance, share, spread
-from virtualwork.intime.growth import at_start, differences, flows, grown, ways_of
+from virtualwork.intime.estimate import GAIN, LEAST, SAFETY, TRIES, first_tolerance
+from virtualwork.intime.growth import at_start, flows, grown, ways_of
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
@@ -290,10 +291,10 @@ class _Lanes:
         rows, tolerance = np.flatnonzero(self.together), first_tolerance(accuracy)
         nodes = self.way(rows, tolerance, alone)
         for tries in range(TRIES):
-            coarse, nodes = nodes, self.halved(rows, nodes)
+            nodes = self.halved(rows, nodes)
             times = self.times(rows, nodes, alone)
             past = np.isnan(times)
-            error = self._error(rows, coarse, nodes, times)
+            error = self._error(rows, nodes, times)
             error[past] = np.nan
             for j, level in self.levels.items():
                 beside = np.abs(nodes.q[-1, :, j] - level) <= error[:, -1, j]
@@ -372,31 +373,35 @@ class _Lanes:
                     row[: len(its)], row[len(its) :] = its, np.nan
         return result
 
-    def _error(self, rows: Rows, coarse: Nodes, fine: Nodes, times: Reals) -> Reals:
-        """The error of the inputs at all times, (lanes, n, k), as `estimate.input_error`."""
-        part, ends = share(True), fine.at(np.s_[::2])
-        q, off, faster = (np.swapaxes(x, 0, 1) for x in (ends.q, ends.q - coarse.q, ends.v - coarse.v))
-        result = spread(q, apart(coarse.t.T, off, faster), part)
-        changes = part * np.concatenate([off, faster], axis=2)
-        for lanes in np.array_split(np.arange(len(rows)), 1 + len(rows) * len(coarse.t) // HELD):
-            result[lanes] += self._grown(rows[lanes], coarse.at(np.s_[:, lanes]), changes[lanes].T)
-        at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
-        at = np.minimum(at + (at > 0), len(coarse.t) - 1)
+    def _error(self, rows: Rows, nodes: Nodes, times: Reals) -> Reals:
+        """The error of the inputs at all times, (lanes, n, k), as `estimate.errors`."""
+        result, t = np.empty((len(rows), 1 + len(nodes.t) // 2, self.k)), nodes.t[::2]
+        for lanes in np.array_split(np.arange(len(rows)), 1 + len(rows) * len(nodes.t) // HELD):
+            result[lanes] = self._off(rows[lanes], nodes.at(np.s_[:, lanes]))
+        at = np.stack([(t < x).sum(axis=0) for x in times.T], axis=1)
+        at = np.minimum(at + (at > 0), len(t) - 1)
         return np.asarray(result[np.arange(len(result))[:, None], at])
 
-    def _grown(self, rows: Rows, nodes: Nodes, changes: Reals) -> Reals:
-        """What the motions make of rounding, and of how two ways part over each step, the largest so far, (lanes, rounds, k)."""
-        scale, h = self.scale[rows].T, np.diff(nodes.t, axis=0)
+    def _off(self, rows: Rows, nodes: Nodes) -> Reals:
+        """What the motions make of rounding and of the errors of the steps, the largest so far, (lanes, rounds, k)."""
+        scale, h, k = self.scale[rows].T, np.diff(nodes.t[::2], axis=0), self.k
 
         def of(tape: Tape, q: Reals, v: Reals) -> Reals:
-            flat = (x.reshape(self.k, -1).T for x in (q, v))
-            return self._run(tape, np.tile(rows, q.shape[1]), *flat)[:, : self.k].T.reshape(q.shape)
+            flat = (x.reshape(k, -1).T for x in (q, v))
+            return self._run(tape, np.tile(rows, q.shape[1]), *flat)[:, :k].T.reshape(q.shape)
+
+        def rates(_: Reals, q: Reals, v: Reals) -> Reals:
+            return of(self.rates, q, v)
 
         q, v, a = (np.moveaxis(x, -1, 0) for x in (nodes.q, nodes.v, nodes.rates[..., :-1]))
-        flow, rounds = flows(lambda t, q, v: of(self.rates, q, v), scale, nodes.t, q, v, a)
-        start, local = at_start(q[:, 0], v[:, 0]), differences(flow, changes)
-        size, _ = grown(flow, h, rounds, ways_of(h, q, v, of(self.loads, q, v)), start, local=local)
-        return np.asarray(np.maximum.accumulate(np.minimum(size, scale[:, None]), axis=1).T)
+        flow, rounds, slopes = flows(rates, scale, nodes.t, q, v, a)
+        local = step_errors(rates, slopes, nodes.t, q, v, a)
+        start = at_start(q[:, 0], v[:, 0])
+        q, v = q[:, ::2], v[:, ::2]
+        off = grown(flow, h, rounds, ways_of(h, q, v, of(self.loads, q, v)), start, local)
+        parts = off.rounded, off.stepped
+        rounded, stepped = (np.maximum.accumulate(x[:k], axis=1) for x in parts)
+        return np.asarray((np.minimum(rounded, scale[:, None]) + SAFETY * stepped + 4 * EPS * np.abs(q)).T)
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""
