@@ -65,7 +65,8 @@ def test_many_together_as_one_by_one(angle: float) -> None:
         ]
     for estimate in (*runs.error_estimate[..., 0], one.error_estimate[:, 0]):
         assert (np.array(error)[1:] <= estimate[1:]).all()
-        assert estimate[-1] <= 5 * max(error) + 1e-14
+        # hanging still it is what rounding in two long steps may come to
+        assert estimate[-1] <= 5 * max(error) + 1e-12
 
 
 def test_beside_a_fold() -> None:
