@@ -24,7 +24,7 @@ Rates = Callable[[Reals, Reals, Reals], Reals]
 # nodes of a step where its states are, and the others
 ENDS, INSIDE = [0, 3, 6], [1, 2, 4, 5]
 # how often the linear equation moves the accelerations
-SWEEPS = 5
+SWEEPS = 3
 
 
 class Rule(NamedTuple):
@@ -123,13 +123,16 @@ def step_errors(f: Rates, slopes: Reals, t: Reals, q: Reals, v: Reals, a: Reals)
 
     def integrated(x: Reals) -> Reals:
         """By how much accelerations (7, k, n, …) change inputs and speeds until each node, (7, 2k, n, …)."""
-        sums = h * np.tensordot(both, x, 1)
-        return np.concatenate([h * sums[: len(c)], sums[len(c) :]], axis=1)
+        sums, result = np.tensordot(both, x, 1), np.empty((len(c), 2 * k, *x.shape[2:]))
+        np.multiply(sums[: len(c)], h * h, out=result[:, :k])
+        np.multiply(sums[len(c) :], h, out=result[:, k:])
+        return result
 
     off = missing = integrated(values) + np.concatenate(
         [np.multiply.outer(c, h * fast[0]) - there, fast[0] - faster], axis=1
     )
     bent = np.tensordot(between, three(slopes, 2), 1)
     for _ in range(SWEEPS):
-        off = missing + integrated(np.einsum("pij...,pj...->pi...", bent, off))
+        off = integrated(np.einsum("pij...,pj...->pi...", bent, off))
+        off += missing
     return np.where(h > 0, off[-1], 0.0)

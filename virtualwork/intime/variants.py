@@ -40,8 +40,8 @@ Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 # steps of one variant; beyond them it is done singly
 MOST = 20_000
-# steps of which the growth of rounding is computed at a time
-HELD = 1 << 16
+# steps of which the errors are computed at a time: what they need then stays near the processor
+HELD = 1 << 14
 # rounds between two looks, at first and later
 SOON, LATER = 16, 128
 # the results of each variant over its times
