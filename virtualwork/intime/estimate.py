@@ -69,7 +69,7 @@ def share(fine: Travel, coarse: Travel) -> float:
 
 
 def errors(fine: Travel, coarse: Travel, t: Reals) -> tuple[Reals, Reals]:
-    """How far the inputs and their speeds may be from the truth at times, (n, k) each: between two nodes that of the one after both, for within a step it may be larger than at its ends."""
+    """How far the inputs and their speeds may be from the truth at times, (n, k) each: between two nodes that of the one after, which holds within the step too."""
     nodes, rounded, stepped = fine.off
     (q, v, *_), part = fine.at(nodes), share(fine, coarse)
     error, rates = np.split(rounded + SAFETY * stepped, 2, axis=1)
@@ -82,7 +82,8 @@ def errors(fine: Travel, coarse: Travel, t: Reals) -> tuple[Reals, Reals]:
         rates = np.maximum(rates, faster * np.divide(error, gap, out=np.zeros_like(gap), where=gap > 0))
         error, rates = error + part * gap, rates + part * faster
     after = np.searchsorted(nodes, t)
-    rows = np.minimum(after + (after > 0), len(nodes) - 1)
+    # by two solutions alone nothing is known of what is between two nodes
+    rows = np.minimum(after + (after > 0) * bool(part), len(nodes) - 1)
     return error[rows], rates[rows]
 
 

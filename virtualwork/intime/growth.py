@@ -94,7 +94,7 @@ def grown(
     start : Off
         At the first state.
     local : array (2k, n, …), optional
-        The errors of the steps; see `defect`.
+        The errors of the steps at their ends; see `defect`.
     stiff : bool
         Whether what is off shrinks within a step by far.
 
@@ -128,6 +128,16 @@ def grown(
     errors = np.broadcast_to(local, (2 * k, *ways.shape[1:]))[:, None]
     with np.errstate(all="ignore"):
         return _along(flow, stirred, np.concatenate([same, errors], axis=1), start)
+
+
+def within(stepped: Reals, middle: Reals) -> Reals:
+    """What states are off by for the errors of the steps (2k, n + 1, …), or within the step before them if that is more.
+
+    >>> within(np.array([[0.0, 1.0, 2.0]]), np.array([[-3.0, 0.5]])).tolist()
+    [[0.0, 3.0, 2.0]]
+    """
+    beside = stepped[:, :-1] + np.abs(middle)
+    return np.concatenate([stepped[:, :1], np.maximum(stepped[:, 1:], beside)], axis=1)
 
 
 def ways_of(h: Reals, q: Reals, v: Reals, sizes: Reals | float = 0.0) -> Reals:

@@ -211,8 +211,8 @@ class Path:
         """Whether the steps are those of an implicit method."""
         return self.method.stable == np.inf
 
-    def off(self, t: Reals, start: Off | None) -> tuple[Reals, Reals, Off]:
-        """What inputs and their speeds are off by at times t (n,) from the first node to the last, for rounding and for the errors of the steps, (2k, n) each; and the last state, by `start`, that of the first.
+    def off(self, t: Reals, start: Off | None) -> tuple[Reals, Reals, Reals, Off]:
+        """What inputs and their speeds are off by at times t (n,) from the first node to the last, for rounding and for the errors of the steps, (2k, n) each; by how much more in the middle between two times, (2k, n − 1); and the last state, by `start`, that of the first.
 
         Between two of the times there is at least one step, or better two of one length.
         """
@@ -228,23 +228,25 @@ class Path:
             rates = np.abs(np.concatenate([v, a]))[:, ::2]
             ways[: 2 * k] = 0.5 * h * (rates[:, 1:] + rates[:, :-1])
             result = grown(free(h, k), h, noise, ways, start)
-            return result.rounded, result.stepped, result.at(-1)
+            return result.rounded, result.stepped, np.zeros((2 * k, len(h))), result.at(-1)
 
         def many(t: Reals, q: Reals, v: Reals) -> Reals:
             return equations.many(t, q.T, v.T)[:, :k].T
 
         motion, stiff = (every, q, v, a), self.stiff
         flow, rounds, slopes = flows(many, np.array(equations.scale), *motion, not equations.stops, stiff)
-        local = step_errors(many, slopes, *motion) if self.judged else 0.0
+        none = np.zeros((2, 2 * k, len(h)))
+        middle, local = step_errors(many, slopes, *motion) if self.judged else none
         result = grown(flow, h, np.hypot(noise, rounds), ways, start, local, stiff)
         last = result.at(-1)
         if not self.coordinates.own:
             seen = self.coordinates.seen(q[:, ::2].T)
-            none = np.zeros_like(seen)
-            turning = np.gradient(seen, t, axis=2) if len(t) > 1 else none
-            rows = (seen, none), (turning, seen)
-            result = result.onto(np.concatenate([np.concatenate(row, axis=1) for row in rows]))
-        return result.rounded, result.stepped, last
+            zero = np.zeros_like(seen)
+            turning = np.gradient(seen, t, axis=2) if len(t) > 1 else zero
+            rows = (seen, zero), (turning, seen)
+            onto = np.concatenate([np.concatenate(row, axis=1) for row in rows])
+            result, middle = result.onto(onto), np.einsum("ij...,j...->i...", onto[:, :, 1:], middle)
+        return result.rounded, result.stepped, middle, last
 
     # --- the inputs -----------------------------------------------------------------------------------------------
     @cached_property

@@ -16,7 +16,7 @@ from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
 from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
-from virtualwork.intime.growth import Off
+from virtualwork.intime.growth import Off, within
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.sticking import gains, holding, rests
@@ -133,10 +133,10 @@ class Travel:
 
     @cached_property
     def off(self) -> tuple[Reals, Reals, Reals]:
-        """Times between steps of the coarse solution (n,); what the motion has made of the rounding of all steps before, and of their errors: of inputs and speeds, the largest so far, (n, 2k)."""
+        """Times between steps of the coarse solution (n,); what the motion has made of the rounding of all steps before, and of their errors: of inputs and speeds, the largest so far, (n, 2k), the latter within the step before too."""
         between = (self.coarse or self).nodes
         times: list[Reals] = []
-        offs: list[list[Reals]] = [[], []]
+        offs: list[list[Reals]] = [[], [], []]
         last: Off | None = None
         for before, leg in zip([None, *self.legs], self.legs, strict=False):
             if before is not None and last is not None and before.followed and leg.followed:
@@ -145,11 +145,13 @@ class Travel:
             begin, end = leg.rows[0][0], leg.end
             inner = between[(between > begin) & (between < end)]
             t = np.concatenate([[begin], inner, [end][: leg.steps]])
-            *parts, last = leg.off(t, last)
+            *parts, middle, last = leg.off(t, last)
             times.append(t)
-            for of, x in zip(offs, parts, strict=True):
-                of.append(x.T)
-        rounded, stepped = (np.maximum.accumulate(np.concatenate(of), axis=0) for of in offs)
+            for of, x in zip(offs, (*parts, np.pad(middle, ((0, 0), (1, 0)))), strict=True):
+                of.append(x)
+        rounded, stepped, middle = (np.concatenate(of, axis=1) for of in offs)
+        rounded, stepped = (np.maximum.accumulate(of, axis=1).T for of in (rounded, stepped))
+        stepped = within(stepped.T, middle[:, 1:]).T
         k, scale = self.legs[0].equations.k, self.legs[0].equations.scale
         rounded[:, :k] = np.minimum(rounded[:, :k], scale)
         return np.concatenate(times), rounded, stepped

@@ -29,7 +29,7 @@ from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.defect import step_errors
 from virtualwork.intime.ends import events, passed, sides
 from virtualwork.intime.estimate import GAIN, LEAST, SAFETY, TRIES, first_tolerance
-from virtualwork.intime.growth import at_start, flows, grown, ways_of
+from virtualwork.intime.growth import at_start, flows, grown, ways_of, within
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
 from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
@@ -41,7 +41,7 @@ Rows = NDArray[np.intp]
 # steps of one variant; beyond them it is done singly
 MOST = 20_000
 # steps of which the errors are computed at a time: what they need then stays near the processor
-HELD = 1 << 14
+HELD = 1 << 13
 # rounds between two looks, at first and later
 SOON, LATER = 16, 128
 # the results of each variant over its times
@@ -379,29 +379,25 @@ class _Lanes:
         for lanes in np.array_split(np.arange(len(rows)), 1 + len(rows) * len(nodes.t) // HELD):
             result[lanes] = self._off(rows[lanes], nodes.at(np.s_[:, lanes]))
         at = np.stack([(t < x).sum(axis=0) for x in times.T], axis=1)
-        at = np.minimum(at + (at > 0), len(t) - 1)
         return np.asarray(result[np.arange(len(result))[:, None], at])
 
     def _off(self, rows: Rows, nodes: Nodes) -> Reals:
         """What the motions make of rounding and of the errors of the steps, the largest so far, (lanes, rounds, k)."""
         scale, h, k = self.scale[rows].T, np.diff(nodes.t[::2], axis=0), self.k
 
-        def of(tape: Tape, q: Reals, v: Reals) -> Reals:
+        def of(_: Reals, q: Reals, v: Reals, tape: Tape = self.rates) -> Reals:
             flat = (x.reshape(k, -1).T for x in (q, v))
             return self._run(tape, np.tile(rows, q.shape[1]), *flat)[:, :k].T.reshape(q.shape)
 
-        def rates(_: Reals, q: Reals, v: Reals) -> Reals:
-            return of(self.rates, q, v)
-
         q, v, a = (np.moveaxis(x, -1, 0) for x in (nodes.q, nodes.v, nodes.rates[..., :-1]))
-        flow, rounds, slopes = flows(rates, scale, nodes.t, q, v, a)
-        local = step_errors(rates, slopes, nodes.t, q, v, a)
+        flow, rounds, slopes = flows(of, scale, nodes.t, q, v, a)
+        middle, local = step_errors(of, slopes, nodes.t, q, v, a)
         start = at_start(q[:, 0], v[:, 0])
         q, v = q[:, ::2], v[:, ::2]
-        off = grown(flow, h, rounds, ways_of(h, q, v, of(self.loads, q, v)), start, local)
-        parts = off.rounded, off.stepped
-        rounded, stepped = (np.maximum.accumulate(x[:k], axis=1) for x in parts)
-        return np.asarray((np.minimum(rounded, scale[:, None]) + SAFETY * stepped + 4 * EPS * np.abs(q)).T)
+        off = grown(flow, h, rounds, ways_of(h, q, v, of(h, q, v, self.loads)), start, local)
+        rounded, stepped = (np.maximum.accumulate(x[:k], axis=1) for x in (off.rounded, off.stepped))
+        stepped = SAFETY * within(stepped, middle[:k])
+        return np.asarray((np.minimum(rounded, scale[:, None]) + stepped + 4 * EPS * np.abs(q)).T)
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""
