@@ -155,7 +155,10 @@ def _falling_four_bar(rng: np.random.Generator) -> Pairs:
         {"A": 0j, "D": complex(d)}, links, inputs=Input(link="AB", value=at), guess=guess, gravity=-1j * G
     )
     end = float(rng.uniform(0.3, 3.0))
-    exact = falling_four_bar.angle(mp.mpf(end), mp.mpf(at), 20, 160)
+    try:
+        exact = falling_four_bar.angle(mp.mpf(end), mp.mpf(at), 20, 160)
+    except ArithmeticError:
+        return []
     pairs: Pairs = []
     for accuracy in (10.0 ** rng.uniform(-12, -2, 4)).tolist():
         pairs += _pairs(m.simulate([0, end], angle=at, accuracy=accuracy), lambda _: exact)

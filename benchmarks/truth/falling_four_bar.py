@@ -18,7 +18,13 @@ MASSES, INERTIAS, G = ("1", "2", "1.5"), ("0.1", "0.02", "0.008"), "9.81"
 
 
 def angle(t: Any, start: Any, digits: int = 30, points: int = 256) -> Any:
-    """The crank's angle, rad, at a time t after it was released at rest at `start`, the coupler's joint above."""
+    """The crank's angle, rad, at a time t after it was released at rest at `start`, the coupler's joint above.
+
+    Raises
+    ------
+    ArithmeticError
+        It takes more points, as from a place near a dead point.
+    """
     with mp.workdps(digits + 10):
         begin = mp.mpf(start)
         energy = _energies(begin)[1]
@@ -43,7 +49,8 @@ def angle(t: Any, start: Any, digits: int = 30, points: int = 256) -> Any:
             sum(v * mp.cos(j * u) for u, v in zip(us, values, strict=True)) * (1 if j == 0 else 2) / n
             for j in range(n)
         ]
-        assert abs(series[-1]) < mp.mpf(10) ** (-digits) * abs(series[0]), "more points"
+        if abs(series[-1]) > mp.mpf(10) ** (-digits) * abs(series[0]):
+            raise ArithmeticError("more points")
         lasts = 2 * mp.pi * series[0]
         left = mp.mpf(t) - lasts * mp.floor(mp.mpf(t) / lasts)
 

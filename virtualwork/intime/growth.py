@@ -130,14 +130,17 @@ def grown(
         return _along(flow, stirred, np.concatenate([same, errors], axis=1), start)
 
 
-def within(stepped: Reals, middle: Reals) -> Reals:
-    """What states are off by for the errors of the steps (2k, n + 1, …), or within the step before them if that is more.
+def within(stepped: Reals, middle: Reals, h: Reals) -> Reals:
+    """What states are off by for the errors of the steps (2k, n + 1, …), or within the step of length h before them if that is more.
 
-    >>> within(np.array([[0.0, 1.0, 2.0]]), np.array([[-3.0, 0.5]])).tolist()
-    [[0.0, 3.0, 2.0]]
+    Between its ends and its middle what is off in q is a cubic, which the speeds at both move by up to 4/27 of half the step each.
+
+    >>> within(np.array([[0.0, 1.0, 2.0], [0.0, 0.0, 0.0]]), np.array([[-3.0, 0.5], [0.0, 0.0]]), np.ones(2)).tolist()
+    [[0.0, 3.0, 2.0], [0.0, 0.0, 0.0]]
     """
-    beside = stepped[:, :-1] + np.abs(middle)
-    return np.concatenate([stepped[:, :1], np.maximum(stepped[:, 1:], beside)], axis=1)
+    off = np.maximum(stepped[:, 1:], stepped[:, :-1] + np.abs(middle))
+    places, speeds = np.split(off, 2)
+    return np.concatenate([stepped[:, :1], np.concatenate([places + 4 / 27 * h * speeds, speeds])], axis=1)
 
 
 def ways_of(h: Reals, q: Reals, v: Reals, sizes: Reals | float = 0.0) -> Reals:

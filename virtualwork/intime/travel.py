@@ -151,7 +151,7 @@ class Travel:
                 of.append(x)
         rounded, stepped, middle = (np.concatenate(of, axis=1) for of in offs)
         rounded, stepped = (np.maximum.accumulate(of, axis=1).T for of in (rounded, stepped))
-        stepped = within(stepped.T, middle[:, 1:]).T
+        stepped = within(stepped.T, middle[:, 1:], np.diff(np.concatenate(times))).T
         k, scale = self.legs[0].equations.k, self.legs[0].equations.scale
         rounded[:, :k] = np.minimum(rounded[:, :k], scale)
         return np.concatenate(times), rounded, stepped

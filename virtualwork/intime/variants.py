@@ -395,9 +395,9 @@ class _Lanes:
         start = at_start(q[:, 0], v[:, 0])
         q, v = q[:, ::2], v[:, ::2]
         off = grown(flow, h, rounds, ways_of(h, q, v, of(h, q, v, self.loads)), start, local)
-        rounded, stepped = (np.maximum.accumulate(x[:k], axis=1) for x in (off.rounded, off.stepped))
-        stepped = SAFETY * within(stepped, middle[:k])
-        return np.asarray((np.minimum(rounded, scale[:, None]) + stepped + 4 * EPS * np.abs(q)).T)
+        rounded, stepped = (np.maximum.accumulate(x, axis=1) for x in (off.rounded, off.stepped))
+        stepped, rounded = SAFETY * within(stepped, middle, h)[:k], np.minimum(rounded[:k], scale[:, None])
+        return np.asarray((rounded + stepped + 4 * EPS * np.abs(q)).T)
 
     def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""
