@@ -13,9 +13,9 @@ from virtualwork.intime.defect import step_errors
 
 
 def off(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """The errors of steps of q̈ = −q."""
+    """The errors of steps of q̈ = −q at their ends."""
     slopes = np.broadcast_to(np.array([[-1.0, 0.0]])[..., None], (1, 2, len(t)))
-    return step_errors(lambda t, q, v: -q, slopes, t, q[None], v[None], -q[None])
+    return step_errors(lambda t, q, v: -q, slopes, t, q[None], v[None], -q[None])[1]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0, 0.0])
@@ -65,8 +65,8 @@ def test_many_together_as_one_by_one(angle: float) -> None:
         ]
     for estimate in (*runs.error_estimate[..., 0], one.error_estimate[:, 0]):
         assert (np.array(error)[1:] <= estimate[1:]).all()
-        # hanging still it is what rounding in two long steps may come to
-        assert estimate[-1] <= 5 * max(error) + 1e-12
+        # hanging still it is what rounding in two long steps may come to, far below the accuracy
+        assert estimate[-1] <= 5 * max(error) + 1e-6 * 1e-5
 
 
 def test_beside_a_fold() -> None:

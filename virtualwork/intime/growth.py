@@ -140,7 +140,9 @@ def within(stepped: Reals, middle: Reals, h: Reals) -> Reals:
     """
     off = np.maximum(stepped[:, 1:], stepped[:, :-1] + np.abs(middle))
     places, speeds = np.split(off, 2)
-    return np.concatenate([stepped[:, :1], np.concatenate([places + 4 / 27 * h * speeds, speeds])], axis=1)
+    with np.errstate(invalid="ignore"):
+        places = places + np.where(h > 0, 4 / 27 * h * speeds, 0.0)
+    return np.concatenate([stepped[:, :1], np.concatenate([places, speeds])], axis=1)
 
 
 def ways_of(h: Reals, q: Reals, v: Reals, sizes: Reals | float = 0.0) -> Reals:

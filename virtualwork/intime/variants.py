@@ -379,7 +379,7 @@ class _Lanes:
         for lanes in np.array_split(np.arange(len(rows)), 1 + len(rows) * len(nodes.t) // HELD):
             result[lanes] = self._off(rows[lanes], nodes.at(np.s_[:, lanes]))
         at = np.stack([(t < x).sum(axis=0) for x in times.T], axis=1)
-        return np.asarray(result[np.arange(len(result))[:, None], at])
+        return np.asarray(result[np.arange(len(result))[:, None], np.minimum(at, len(t) - 1)])
 
     def _off(self, rows: Rows, nodes: Nodes) -> Reals:
         """What the motions make of rounding and of the errors of the steps, the largest so far, (lanes, rounds, k)."""
