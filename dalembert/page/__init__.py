@@ -13,6 +13,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -221,4 +222,6 @@ def _filled(title: str, html: str, script: str, names: Sequence[str], data: Mapp
 
 @cache
 def _part(name: str) -> str:
-    return (files("dalembert.page") / name).read_text(encoding="utf-8")
+    text = (files("dalembert.page") / name).read_text(encoding="utf-8")
+    # remarks of whole lines but the first are for who reads the file
+    return re.sub(r"(?m)(?<=\n)\s*//.*\n", "", text) if name.endswith(".js") else text
