@@ -34,7 +34,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("runs",),
-        ("cylinders", "log_picture", "placing"),
+        ("cylinders", "log_picture", "placement_request"),
         ("doubt", "next_run", "objective", "polygons", "weights"),
         (
             "amplitudes",

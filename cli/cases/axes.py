@@ -355,7 +355,7 @@ def history_axis(m: Mechanism) -> Axis:
     q = np.empty((len(time), len(laws)))
     for j, law in enumerate(laws):
         if law is None:
-            q[:, j] = m.at[j] if m.inputs[j].value is None else m.inputs[j].value
+            q[:, j] = m.own_inputs[j]
         elif np.array_equal(law[:, 0], time):
             q[:, j] = law[:, 1]
         else:

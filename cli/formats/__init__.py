@@ -99,8 +99,7 @@ def _pages(title: str, taken: list[str], made: ImportedMechanism) -> list[Sheet]
     file = Sheet("", [Section("The file for dalembert mechanism", [CODE + made.toml.rstrip("\n")])])
     try:
         m = made.mechanism
-        inputs = tuple(at if e.value is None else e.value for e, at in zip(m.inputs, m.at, strict=True))
-        return [posed(title, m, inputs, tomllib.loads(made.toml).get("units", {}), first), file]
+        return [posed(title, m, m.own_inputs, tomllib.loads(made.toml).get("units", {}), first), file]
     except MechanismError as error:
         return [Sheet(title, [first, Section("Mechanism", [str(error)])]), file]
 

@@ -163,7 +163,7 @@ def reading_error(text: str | None) -> tuple[float, float] | None:
 
 
 def mass_limits(texts: Sequence[str]) -> dict[str, tuple[float, str]]:
-    """Read the limits of --max-mass, `5g` or `A=5g`, joined by commas: plane -> value and unit; the key "" is for all."""
+    """Read `--max-mass`, such as `5g` or `A=5g,B=8g`: plane -> value and unit; the key "" is for all planes."""
     limits: dict[str, tuple[float, str]] = {}
     for text in ",".join(texts).split(",") if texts else ():
         plane, mark, value = text.rpartition("=")

@@ -225,7 +225,7 @@ def _between(miss: Callable[[float], float], low: float, high: float, size: floa
 
 
 def with_found(result: Result, solution: Found) -> Result:
-    """Return the result with the number of --find: above the table, in JSON, in addition to a table alone."""
+    """Return the result with the number that `--find` found: above the table, in JSON, and in a note where a table alone is shown."""
     notes, document, aside = result.notes, result.documented, result.aside
     return replace(
         result,

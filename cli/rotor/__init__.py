@@ -19,7 +19,7 @@ from dalembert.quantities import parse_number
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from balancing.placing import Drill
+    from balancing.placement_request import Drill
     from cli.show.commands import ShowOptions
     from dalembert.results.result import Result
     from dalembert.results.way import Topic
@@ -130,7 +130,7 @@ def place(options: SimpleNamespace, show: ShowOptions) -> Result:
     Several corrections are added as vectors first. Without --positions or --blades the result is one mass. In a FILE
     each plane of each rotor is placed on its own.
     """
-    from balancing.placing import Placing, Request
+    from balancing.placement_request import Placing, Request
     from cli.rotor.placed import METHOD, corrections_of, draw, tables, way
     from dalembert.results.result import Result, Section, Sheet
     from dalembert.results.text import heading
@@ -230,7 +230,7 @@ def _drill(drill: str | None, density: str | None, drill_point: str, max_depth: 
     """Read --drill and what goes with it."""
     from fractions import Fraction
 
-    from balancing.placing import Drill
+    from balancing.placement_request import Drill
 
     diameter = quantity("--drill", drill, "length", positive=True)
     rho = quantity("--density", density, "density", positive=True)

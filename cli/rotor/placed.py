@@ -11,7 +11,7 @@ import numpy as np
 
 from balancing import drill_depth
 from balancing.picture import Places, places
-from balancing.placing import Correction, Drill, Placed, Placing, Share, Vector, read_corrections
+from balancing.placement_request import Correction, Drill, Placed, Placing, Share, Vector, read_corrections
 from balancing.weights import angles_again
 from cli.read import options
 from dalembert.angles import degrees, phasor

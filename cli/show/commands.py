@@ -119,7 +119,7 @@ class ShowOptions(SimpleNamespace):
 
     @cached_property
     def chosen_units(self) -> dict[str, str] | None:
-        """The units of --units: dimension -> unit."""
+        """The units that `--units` names: dimension -> unit."""
         from dalembert.results.chosen_units import chosen_units
 
         try:

@@ -144,6 +144,8 @@ def test_what_cannot_be_written_leaves_no_file(tmp_path: Path, dalembert: Dalemb
     )
     with pytest.raises(ValueError, match=r"'a\.step': expected a name that ends in \.dxf"):
         export_mechanism(Mechanism.from_toml(arm), "a.step")
+    with pytest.raises(DataError, match="cannot write: No such file or directory"):
+        export_mechanism(Mechanism.from_toml_text(FOUR_BAR), tmp_path / "none" / "a.svg")
     assert not list(tmp_path.iterdir())
 
 

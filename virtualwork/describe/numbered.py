@@ -21,6 +21,11 @@ class Numbered(Description):
 
         return dict(dimensions(self))
 
+    @property
+    def own_inputs(self) -> tuple[float, ...]:
+        """The inputs as the description has them, rad or m; of those that it does not give, where its guess is meant."""
+        return tuple(at if e.value is None else e.value for e, at in zip(self.inputs, self.at, strict=True))
+
     def value(self, path: str) -> float | complex:
         """Return the number at a path, SI; x + iy of a point; 0 for a rate of an input that the file does not give.
 

@@ -50,7 +50,8 @@ def export_mechanism(
     ValueError
         Another suffix or unit, or another number of inputs.
     DataError, MechanismError
-        It cannot be assembled there; curves of several inputs; DXF without the extra `cad`. Nothing is written.
+        It cannot be assembled there; curves of several inputs; DXF without the extra `cad`; the file cannot be written.
+        Then nothing is.
 
     Examples
     --------
@@ -66,6 +67,7 @@ def export_mechanism(
     True
     """
     from dalembert.hints import nearest
+    from dalembert.results.files import write
     from dalembert.units import UNITS
 
     path = Path(path)
@@ -76,17 +78,15 @@ def export_mechanism(
         if unit not in UNITS[kind]:
             raise ValueError(f"{kind}: '{unit}' is no unit of {kind}{nearest(unit, UNITS[kind])}")
     if at is None:
-        own = zip(mechanism.inputs, mechanism.at, strict=True)
-        inputs = [guess if e.value is None else e.value for e, guess in own]
-    else:
-        inputs = [at] if isinstance(at, int | float) else list(at)
+        at = mechanism.own_inputs
+    inputs = [at] if isinstance(at, int | float) else list(at)
     if len(inputs) != len(mechanism.inputs):
         names = ", ".join(e.name for e in mechanism.inputs)
         raise ValueError(f"at: found {len(inputs)} values, expected one for each input: {names}")
     data, notes = file_bytes(
         mechanism, tuple(map(float, inputs)), suffix, "", {"length": length, "angle": angle}
     )
-    path.write_bytes(data)
+    write(path, data)
     return notes
 
 

@@ -110,6 +110,9 @@ def step_errors(f: Rates, slopes: Reals, t: Reals, q: Reals, v: Reals, a: Reals)
         return np.stack([x[(*before, np.s_[i : last + i : 2])] for i in range(3)])
 
     first, fast, pull = (three(x, 1) for x in (q, v, a))
+    # the time of a middle is rounded: what moves until it is no error
+    late = t[1::2] - t[:-1:2] - 0.5 * h
+    first[1], fast[1] = first[1] - late * fast[1], fast[1] - late * pull[1]
     ways = np.concatenate([first[1:] - first[0], h * fast, h * h * pull])
     there, faster = np.tensordot(place, ways, 1), np.tensordot(speed, ways, 1) / unit
     at = (first[0] + there[INSIDE], faster[INSIDE])
